@@ -39,9 +39,8 @@ struct Cli {
     command: Command,
     /// Print one JSON object instead of text, and JSON lines on stderr
     ///
-    /// Each line on stderr is then one object: {"warning": "…"}, {"note": "…"}, progress with the keys done and units, and where
-    /// the command fails {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 for an invalid command line,
-    /// else 1.
+    /// Each line on stderr is then one object: {"warning": "…"}, {"note": "…"}, progress with the keys done and units, and, if the command
+    /// fails, {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 for an invalid command line, else 1.
     #[arg(long, global = true)]
     json: bool,
     /// When to colour messages, help and progress
@@ -82,11 +81,11 @@ enum Command {
     /// Radiographs, spectra and materials
     #[command(subcommand)]
     Xray(commands::xray::XrayCommand),
-    /// Estimate time and disk of a plan, and check that it can be made
+    /// Estimate time and disk space of a plan, and check that it can run
     Plan(commands::plan::PlanArgs),
     /// Make or resume the dataset of a plan
     Generate(commands::generate::GenerateArgs),
-    /// Make a plan on a cluster
+    /// Run a plan on a cluster
     #[command(subcommand)]
     Submit(Box<commands::submit::SubmitCommand>),
     /// Show the progress of a dataset, or of the jobs that make it

@@ -23,7 +23,7 @@ const PROBE: usize = 4096;
 
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct ReplaceArgs {
-    /// Replace output files that exist; each old file stays until the new one is whole
+    /// Replace existing output files; each old file is kept until the new one is complete
     #[arg(long)]
     replace: bool,
 }

@@ -10,13 +10,13 @@ pub struct ScanArgs {
     /// DICOM folder or file, or a volume in one file such as .nii.gz
     #[arg(value_name = "CT")]
     pub path: PathBuf,
-    /// Which series of a DICOM folder that holds several: its number, or its UID
+    /// Series to read from a DICOM folder that contains several: its number or UID
     #[arg(long, value_name = "NUMBER")]
     series: Option<SeriesChoice>,
     /// Interpolate DICOM slices that are missing or unevenly spaced, instead of refusing the series
     #[arg(long)]
     fill_gaps: bool,
-    /// Read other modalities than CT and values not in HU, instead of refusing them
+    /// Read modalities other than CT and values not in HU, instead of refusing them
     #[arg(long)]
     force: bool,
 }

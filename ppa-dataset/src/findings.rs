@@ -31,7 +31,7 @@ pub enum Severity {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum FindingCode {
-    /// A warning of the reader of the scan.
+    /// A warning from reading the scan.
     ScanWarning,
     /// The scan shows several limbs.
     SeveralLimbs,
@@ -41,31 +41,31 @@ pub enum FindingCode {
     BodyKept,
     /// A person removed a part of the scan.
     PartRemoved,
-    /// The limb is too thin or too short for one.
+    /// The limb is too thin or too short to be a limb.
     LimbTooSmall,
-    /// The limb is too thick for one: a trunk.
+    /// The limb is too thick to be a limb: a trunk.
     LimbTooLarge,
     /// A part of another limb is fused to the skin.
     FusedLimb,
-    /// The field of view cuts the limb elsewhere than at its end.
+    /// The field of view cuts the limb somewhere other than at its end.
     CutLimb,
     /// The field of view cuts the limb within a region of interest.
     CutInRegion,
     /// The supporting plane lies on a face where the field of view cuts the limb.
     PlaneOnCut,
-    /// The normal of the supporting plane is an axis of the image.
+    /// The normal of the supporting plane is parallel to an axis of the image.
     PlaneAlongImage,
-    /// Distal and proximal contact with the table are too near to each other to determine the pitch.
+    /// The distal and proximal contacts with the table are too close together to determine the pitch.
     ContactsTooNear,
     /// A person gave the supporting plane.
     PlaneGiven,
     /// The axis of rotation is inclined to the bone's shaft.
     AxisOffShaft,
-    /// The axis of a lower leg passes through centres of the skin.
+    /// The axis of a lower leg passes through centres of the skin's cross-sections, not the tibia's.
     AxisWithoutBone,
-    /// The regions that give the axis lie closer together than in a scan that is long enough.
+    /// The regions that define the axis are closer together than in a sufficiently long scan.
     RegionsCloser,
-    /// The fibula lies where that of the other side would.
+    /// The fibula lies where it would in a limb of the other side.
     SideMismatch,
     /// The anterior direction points to the patient's back.
     AnteriorReversed,
@@ -73,13 +73,13 @@ pub enum FindingCode {
     NoJoint,
     /// The joint centre lies outside the limb.
     JointOutside,
-    /// The joint lies elsewhere than the ankle that the scan shows.
+    /// The joint does not lie at the ankle that the scan shows.
     JointOffAnkle,
     /// The joint lies outside the radiograph.
     JointOffDetector,
-    /// The joint lay beside the axis that a person gave.
+    /// The joint did not lie on the axis that a person gave.
     JointOffAxis,
-    /// The scan shows another joint than the one the limb is posed about.
+    /// The scan shows a joint other than the one the limb is posed about.
     OtherJoint,
     /// The scan cuts the tibial plateau of a knee.
     PlateauCut,
@@ -87,7 +87,7 @@ pub enum FindingCode {
     KneeAxis,
     /// The scan does not show the back of both condyles of a knee.
     CondylesNotSeen,
-    /// The limb lies the other way round than the scan's orientation says.
+    /// The limb points the opposite way to what the scan's orientation says.
     ProximalIsInferior,
 }
 

@@ -48,14 +48,14 @@ pub struct FileRow {
     pub camera: Option<View>,
     /// Body shape; radiographs show the scan itself.
     pub shape: BodyShape,
-    /// Depth images of other body shapes: how much more than the skin of the scan this one encloses, mm³.
+    /// Depth images of other body shapes: how much more volume this skin encloses than that of the scan, mm³.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub volume_change_mm3: Option<f64>,
     /// Depth images: pixels that see something beyond the 65.535 m that 16 bits hold, 0 in the file.
     #[serde(skip_serializing_if = "is_zero", default)]
     pub too_far_pixels: usize,
-    /// Share of the image's region of interest that lies where the field of view of the scan cuts the limb off: pixels of a depth image that
-    /// see the cut, rays of a radiograph that pass through it. Left out where it is 0.
+    /// Share of the image's region of interest where the field of view of the scan cuts off the limb: pixels of a depth image that see the
+    /// cut, or rays of a radiograph that pass through it. Left out where it is 0.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub cut_share: Option<f64>,
     /// The limb's frame in the scan: T^P_CT.
@@ -65,8 +65,8 @@ pub struct FileRow {
     /// Radiographs: pose of the x-ray device in the scan.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub ct_from_device: Option<TransformRows>,
-    /// Radiographs: tube load whose noise the image carries, mAs; left out for the expected image and where the fluence of the tube is
-    /// unknown.
+    /// Radiographs: tube load that the noise of the image corresponds to, mAs; left out for the expected image and where the fluence of the
+    /// tube is unknown.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub mas: Option<f64>,
     /// Radiographs: exposure index of IEC 62494-1.

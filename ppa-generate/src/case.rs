@@ -14,8 +14,8 @@ use crate::toml_edits::with_keys;
 use crate::toml_file::{other_version, relative_to, to_toml};
 use ppa_dataset::labels::BoneFile;
 
-/// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
-/// `choices`, and everything else is computed again when the case is used.
+/// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and `choices`, and everything else is recomputed when
+/// the case is used.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Case {
     /// Format of this file; 1.
@@ -27,15 +27,14 @@ pub struct Case {
     pub acknowledged: Vec<FindingCode>,
     /// The scan.
     pub source: Source,
-    /// How the skin is found and freed from the couch.
+    /// How the skin is found and separated from the couch.
     pub surface: LimbSettings,
-    /// Landmark decisions of a person; what is left open is found again.
+    /// Landmark decisions of a person; what is left out is determined again.
     pub choices: LandmarkOverrides,
     /// Which bone each voxel belongs to, for computed labels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bones: Option<BoneFile>,
-    /// What followed from them when the case was written; `None` for a case that was read,
-    /// since a person may have edited it.
+    /// What was derived from the other keys when the case was written; `None` for a case that was read, since a person may have edited it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub found: Option<Found>,
 }
@@ -61,7 +60,7 @@ struct CaseFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
-    /// DICOM folder or NIfTI file; relative paths start at the case file.
+    /// DICOM folder or NIfTI file; a relative path is resolved against the folder of the case file.
     pub path: PathBuf,
     /// SHA-256 over size, affine and Hounsfield units of the volume: the scan's identity.
     pub volume_sha256: String,
@@ -71,7 +70,7 @@ pub struct Source {
     /// Whether gaps between slices are interpolated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub fill_gaps: bool,
-    /// Whether another modality or values not in HU are read.
+    /// Whether modalities other than CT and values not in HU are read.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub force: bool,
 }
@@ -94,7 +93,7 @@ pub struct Found {
     pub findings: Vec<Finding>,
     /// Axis, joint and plane in the ct frame, mm.
     pub landmarks: Landmarks,
-    /// What was cut away to free the skin.
+    /// What was cut away to isolate the skin.
     pub surface: LimbReport,
 }
 

@@ -28,7 +28,7 @@ pub(crate) struct Settings {
     seed: u64,
     /// Body shapes.
     shapes: ShapeSettings,
-    /// How far heel and calf sink in where they rest.
+    /// How deeply heel and calf are indented where they rest on the table.
     soft_tissue: SoftTissue,
     /// Errors of positioning; left out where there are none.
     #[serde(skip_serializing_if = "Positioning::is_default")]
@@ -37,7 +37,7 @@ pub(crate) struct Settings {
     room_ply_sha256: Option<String>,
     /// The built-in room, and the x-ray device in either room.
     room: RoomSpec,
-    /// How the table plane is searched; `null` where it is what the central beam hits first.
+    /// How the table plane is searched for; `null` if it is the surface that the central beam hits first.
     table: Option<PlaneSettings>,
     /// Pose of the x-ray device in a recorded room, row-major, mm; `null` where the plan gives none.
     room_from_device: Option<TransformRows>,
@@ -145,11 +145,11 @@ struct LimbRow<'a> {
     /// Person and side.
     #[serde(flatten)]
     limb: LimbId,
-    /// Hash of all that the images of this limb follow from, except the pose.
+    /// Hash of everything that the images of this limb depend on, except the pose.
     key: String,
     /// SHA-256 over size, affine and Hounsfield units of the scan.
     volume_sha256: &'a str,
-    /// How the skin is found and freed from the couch.
+    /// How the skin is found and separated from the couch.
     surface: &'a LimbSettings,
     /// Landmark decisions of a person.
     choices: &'a LandmarkOverrides,

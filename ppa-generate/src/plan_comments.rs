@@ -5,7 +5,7 @@ pub(crate) const HEADER: &str = "\
 # Plan of a dataset: `ppa plan` estimates its cost, `ppa generate` generates it.
 # Every key is listed with its default; a line may be deleted. Lines that begin with # and no
 # space are optional settings: remove the # to use them. Lengths in mm, angles in degrees.
-# Relative paths start at this file.
+# Relative paths are resolved against the folder of this file.
 
 ";
 
@@ -22,7 +22,7 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
     ),
     (
         "[soft_tissue]",
-        "How far heel and calf sink in where they rest; 0 is a rigid skin.",
+        "How deeply heel and calf are indented where they rest; 0 is a rigid skin.",
     ),
     (
         "[positioning]",
@@ -38,7 +38,7 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
     ),
     ("[depth]", "Depth images of both cameras."),
     ("[xray]", "Radiographs."),
-    ("[xray.source]", "Where photons leave from, and where to."),
+    ("[xray.source]", "Where photons start, and where they go."),
     ("[xray.source.focal_spot]", ""),
     ("[xray.detector]", "Pixels of the radiograph."),
     ("[xray.receptor]", "What the detector makes of photons."),
@@ -60,7 +60,7 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
 /// What a key means, by table and key.
 pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     ("", "version", "format of this file"),
-    ("", "seed", "everything random follows from it"),
+    ("", "seed", "of all random numbers"),
     ("case", "file", "what `ppa prepare` wrote"),
     (
         "case",
@@ -192,13 +192,13 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     (
         "xray.engine",
         "dose_histories",
-        "whose quantum noise the image carries; inf: no noise",
+        "whose quantum noise the image has; inf: no noise",
     ),
     ("xray.engine", "scatter_histories", "followed for scatter"),
     (
         "xray.engine",
         "scatter_pixel_mm",
-        "distance of the points where scatter is computed",
+        "spacing of the points where scatter is computed",
     ),
     (
         "xray.engine",
@@ -210,7 +210,7 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
         "compton_model",
         "how photons scatter off electrons",
     ),
-    ("xray.engine", "seed", "stays 0"),
+    ("xray.engine", "seed", "must be 0"),
     (
         "xray.analog",
         "histories",
@@ -221,7 +221,7 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
         "compton_model",
         "how photons scatter off electrons",
     ),
-    ("xray.analog", "seed", "stays 0"),
+    ("xray.analog", "seed", "must be 0"),
     (
         "xray.presentation",
         "centre",
@@ -287,8 +287,8 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
             "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
             "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid; with moving = false the image shows its lines",
             "#gain_error = 0.01    # relative standard deviation of the pixels' gains after calibration",
-            "#panel = 1    # serial number of the panel; 0 when left out, others have another pattern of gains",
-            "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter; noise_h_mm2 = 0.3 beside it for noise that is blurred less",
+            "#panel = 1    # serial number of the panel; 0 when left out; each has its own pattern of gains",
+            "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter; add noise_h_mm2 = 0.3 for noise that is blurred less",
         ],
     ),
     (
@@ -301,7 +301,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
 
 /// Tables that are off by default, at the end of the file.
 pub(crate) const OFF_TABLES: &str = "
-# How the table top is searched; left out, it is what the central beam hits first.
+# How the table top is searched for; left out, it is what the central beam hits first.
 #[room.table]
 #threshold_mm = 10.0    # from the plane up to which a point belongs to it
 #iterations = 1000

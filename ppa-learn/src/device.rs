@@ -8,7 +8,7 @@ use std::str::FromStr;
 use candle_core::Device;
 use serde::{Deserialize, Serialize};
 
-/// Where a network computes: `"cpu"`, `"cuda"` for the first NVIDIA device, or `"cuda:1"` for the one behind it.
+/// Where a network computes: `"cpu"`, `"cuda"` for the first NVIDIA device, or `"cuda:1"` for the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum DeviceName {

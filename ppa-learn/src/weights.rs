@@ -24,7 +24,7 @@ use crate::network::{EfficientNetB0, Entry, NetworkError};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FirstConvolution {
-    /// Thrown away: the network keeps its own. The paper's authors do so.
+    /// Discarded: the network keeps its own, as the paper's authors do.
     #[default]
     Fresh,
     /// The sum over the channels: what an image that is the same in all channels would have given.

@@ -31,13 +31,13 @@ pub struct CalibrateArgs {
     /// Persons of --dataset [default: all]
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     patients: Option<Vec<u32>>,
-    /// Labels of --dataset, those of labels.NAME.json [default: labels.json]
+    /// Label set of --dataset: labels.NAME.json [default: labels.json]
     #[arg(long, value_name = "NAME")]
     labels: Option<LabelName>,
     /// Probability that an interval contains the label
     #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
     coverage: f64,
-    /// Where the networks compute: cpu, cuda or cuda:N
+    /// Device to run the networks on: cpu, cuda or cuda:N
     #[arg(long, default_value_t)]
     device: DeviceName,
     /// File for `ppa predict --confidence`, in safetensors

@@ -11,7 +11,7 @@ use crate::output::Output;
 
 #[derive(Debug, Args)]
 pub struct CancelArgs {
-    /// Folder that `ppa submit` filled; its files stay
+    /// Folder given to `ppa submit` as --out; its files are kept
     jobs: PathBuf,
 }
 

@@ -12,7 +12,7 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum CtCommand {
-    /// Report geometry and values of a CT, what is unusual, and its effects
+    /// Report geometry, values and anomalies of a CT, and their effects
     Info(info::InfoArgs),
     /// Write a CT in another format: NIfTI, NRRD, MetaImage or DICOM
     Convert(convert::ConvertArgs),

@@ -36,10 +36,10 @@ pub struct EvalArgs {
         requires = "dataset"
     )]
     patients: Option<Vec<u32>>,
-    /// Labels of --dataset, those of labels.NAME.json [default: labels.json]
+    /// Label set of --dataset: labels.NAME.json [default: labels.json]
     #[arg(long, value_name = "NAME", requires = "dataset")]
     labels: Option<LabelName>,
-    /// Where the network computes: cpu, cuda or cuda:N
+    /// Device to run the network on: cpu, cuda or cuda:N
     #[arg(long, default_value_t)]
     device: DeviceName,
     /// Folder for predictions, metrics and figures [default: evaluation, in the run's folder]

@@ -36,7 +36,7 @@ pub enum ExperimentCommand {
     All(run::RunArgs),
     /// Write a page of all results so far: tables, charts, largest errors
     ///
-    /// Tables are shown beside the paper's, and the poses with the largest errors as images.
+    /// Tables are shown next to the paper's, and the poses with the largest errors as images.
     Report(report::ReportArgs),
 }
 

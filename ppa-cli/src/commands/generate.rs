@@ -38,7 +38,7 @@ removed at the end. Files that ppa did not write, or that were altered since, ar
 pub struct GenerateArgs {
     /// Plan file
     plan: PathBuf,
-    /// Folder of the dataset, or a tar archive NAME.tar [default: a folder beside the plan, named after it and the shard]
+    /// Folder of the dataset, or a tar archive NAME.tar [default: a folder next to the plan, named after it and the shard]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Use another seed than the plan's

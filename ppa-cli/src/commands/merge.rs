@@ -13,10 +13,10 @@ use crate::progress::ProgressArgs;
 
 #[derive(Debug, Args)]
 pub struct MergeArgs {
-    /// Folders or archives that `ppa generate --shard` filled, in any order
+    /// Folders or archives written by `ppa generate --shard`, in any order
     #[arg(required = true, value_name = "DIR")]
     shards: Vec<PathBuf>,
-    /// Folder of the whole dataset, or an archive NAME.tar: the same bytes as one run would have left
+    /// Folder of the whole dataset, or an archive NAME.tar: the same bytes as a single run would have written
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Replace what differs from the plan; old images stay until the new ones are complete

@@ -24,10 +24,10 @@ pub struct PlanArgs {
     /// Plan file
     #[arg(required = true)]
     plan: Option<PathBuf>,
-    /// Folder where the dataset will lie [default: as of ppa generate]
+    /// Folder where the dataset will be written [default: as for ppa generate]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Share of the poses to make in a temporary folder and measure; at least one of every limb
+    /// Share of the poses to generate in a temporary folder and time; at least one of every limb
     #[arg(long, default_value_t = 0.0)]
     fraction: f64,
     /// Also estimate how long it takes on a cluster: nodes=N,cores=N (of each node)[,cpus=N (of a task)][,time=LIMIT (of a task)]

@@ -43,7 +43,7 @@ pub struct PredictArgs {
     /// File that `ppa calibrate` wrote for the same networks: adds `interval` and `diagnostic` (yes, no or not_sure), and skips frames unlike the training images
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
-    /// Where the networks compute: cpu, cuda or cuda:N
+    /// Device to run the networks on: cpu, cuda or cuda:N
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

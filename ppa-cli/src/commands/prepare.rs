@@ -34,7 +34,7 @@ enum LimbName {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum AxisName {
-    /// The tibia: a swelling does not move the axis off the joint
+    /// The tibia: swelling does not shift the axis off the joint
     Bone,
     /// The whole cross-section inside the skin
     Limb,
@@ -65,7 +65,7 @@ pub struct PrepareArgs {
     /// A point inside the wanted limb when the scan shows several, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     inside: Option<[f64; 3]>,
-    /// A point inside a further body to keep as a part of the limb, ct frame; may be given several times
+    /// A point inside another body to keep as part of the limb, ct frame; may be given several times
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     keep: Vec<[f64; 3]>,
     /// Remove a ball from the limb: centre and radius, ct frame, mm; may be given several times
@@ -77,10 +77,10 @@ pub struct PrepareArgs {
     /// Which centres in the two regions define the axis: those of the bone or of the whole limb
     #[arg(long, value_enum)]
     axis_source: Option<AxisName>,
-    /// Region just proximal to the joint, mm from the joint towards proximal
+    /// Region just proximal to the joint: from and to, mm proximal to the joint
     #[arg(long, value_name = "FROM,TO", value_parser = range, allow_hyphen_values = true)]
     joint_region: Option<[f64; 2]>,
-    /// Region around the calf, mm from the joint towards proximal
+    /// Region around the calf: from and to, mm proximal to the joint
     #[arg(long, value_name = "FROM,TO", value_parser = range, allow_hyphen_values = true)]
     calf_region: Option<[f64; 2]>,
     /// Two points that the axis runs through, ct frame, instead of the centres of two regions
@@ -99,7 +99,7 @@ pub struct PrepareArgs {
     /// A point of the plane under the limb, ct frame; give three: one distal, two proximal
     #[arg(long = "plane-point", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     plane_points: Vec<[f64; 3]>,
-    /// Picture to check the case with, PNG: slices and skin with axis, joint, plane and cuts [default: beside the case]
+    /// Picture to check the case with, PNG: slices and skin with axis, joint, plane and cuts [default: next to the case]
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Draw no picture
@@ -109,7 +109,7 @@ pub struct PrepareArgs {
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
     /// Segment tibia, fibula, talus and neighbouring bones for `ppa label auto`, and write the label volume: NIfTI, NRRD or MetaImage.
-    /// Refused, with the location, where bones touch
+    /// Fails where bones touch, and names the place
     #[arg(long, value_name = "FILE", conflicts_with = "bones")]
     segment_bones: Option<PathBuf>,
     /// Labels of tibia, fibula and talus in --bones

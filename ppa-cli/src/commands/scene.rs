@@ -56,12 +56,12 @@ impl WhichRoom {
 
 #[derive(Debug, Args)]
 pub struct RoomArgs {
-    /// Room to write, mm: .ply or .obj; points as of a scanner, and triangles where they are known, as `ppa depth render` wants them
+    /// Room to write, mm: .ply or .obj; points as from a scanner, and triangles where known, as `ppa depth render` needs them
     #[arg(long)]
     out: PathBuf,
     #[command(flatten)]
     room: WhichRoom,
-    /// Room file to write: room, device, detector and cameras as they are, to be changed
+    /// Room file to write, for editing: the current room, device, detector and cameras
     #[arg(long)]
     toml: Option<PathBuf>,
     /// Write the poses of device and cameras as JSON: named 4x4, mm
@@ -92,7 +92,7 @@ pub struct PlaceArgs {
     /// Write all poses, from the scan to the cameras, as JSON: named 4x4, mm
     #[arg(long)]
     frames: Option<PathBuf>,
-    /// How far the distal and the proximal part sink in where they rest, mm [default: the plan's, or 0,0: a rigid skin]
+    /// Indentation depth at the distal and the proximal contact, mm [default: the plan's, or 0,0: a rigid skin]
     #[arg(long, value_name = "DISTAL,PROXIMAL", value_parser = range)]
     soft_tissue_mm: Option<[f64; 2]>,
     /// Write the placed skin in room coordinates: .ply, .obj or .stl

@@ -27,13 +27,14 @@ pub struct StudioArgs {
     /// Side of the limb; needed for a scan without a case, and with --watch by networks that were trained with `mirror = true`
     #[arg(long, value_enum)]
     side: Option<SideName>,
-    /// After PATH: folders of finished trainings that judge the poses in step 5, of the left and the right camera's network, or of one for both
+    /// After PATH: folders of finished trainings whose networks judge the poses in step 5, for the left and the right camera, or one for
+    /// both
     #[arg(long, value_name = "DIR", num_args = 1..=2)]
     run: Vec<PathBuf>,
     /// File that `ppa calibrate` wrote for these networks
     #[arg(long, value_name = "FILE", requires = "run")]
     confidence: Option<PathBuf>,
-    /// Show in step 8 what the networks say of the newest frames in this folder, which are named as for `ppa predict --watch`
+    /// Show in step 8 the predictions for the newest frames in this folder, which are named as for `ppa predict --watch`
     #[arg(long, value_name = "DIR", requires_all = ["run", "roi_left", "roi_right"])]
     watch: Option<PathBuf>,
     /// Square around the joint in the left camera's frames, in pixels, as in `roi_depth.json`

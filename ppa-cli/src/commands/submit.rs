@@ -62,10 +62,10 @@ DIR/parts holds the tallies. Before its time limit a task saves its tallies and 
 DIR/slurm holds the plan that the jobs read, their scripts and logs. Options that are not given again keep their values; a \
 script that was edited is used as it is.")]
 pub struct SlurmArgs {
-    /// Plan, as of `ppa generate` or `ppa experiment`
+    /// Plan, as for `ppa generate` or `ppa experiment`
     #[arg(required_unless_present = "command")]
     plan: Option<PathBuf>,
-    /// Folder of the jobs and of what they make, on a disk that all nodes see; created if the folder above exists
+    /// Folder for the jobs and their output, on a disk that all nodes see; created if its parent folder exists
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Partition [default: the cluster's]
@@ -92,7 +92,7 @@ pub struct SlurmArgs {
     /// Shell commands that each job runs first, such as 'module load gcc'
     #[arg(long, value_name = "COMMANDS")]
     setup: Option<String>,
-    /// For a plan of poses: processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
+    /// For a plan of poses: processor time of a pose in seconds, as measured by `ppa plan`, instead of measuring it
     #[arg(long, value_name = "SECONDS")]
     pose_seconds: Option<f64>,
     /// For a plan of poses: make each shard one tar archive, and the dataset another one
@@ -101,10 +101,10 @@ pub struct SlurmArgs {
     /// For a plan of experiments: only these, such as 1,2a [default: all that it has data for]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     experiments: Vec<Experiment>,
-    /// Read all files of shards or parts that are done, and make damaged ones again; a damaged tally is renamed *.damaged
+    /// Read all files of finished shards or parts, and redo damaged ones; a damaged tally is renamed *.damaged
     #[arg(long)]
     check: bool,
-    /// For a command: divide its histories into this many tasks; nothing is measured then
+    /// For a command: divide its histories into this many tasks, instead of measuring their time
     #[arg(long, value_name = "N")]
     tasks: Option<NonZeroU64>,
     /// Write the scripts and print the commands, but queue nothing; needs no Slurm

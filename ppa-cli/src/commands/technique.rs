@@ -6,8 +6,8 @@ use ppa_generate::{Technique, XraySettings};
 
 #[derive(Debug, Args)]
 pub struct TechniqueArgs {
-    /// Usual exposure of an examination: tube voltage and load, focal spot, collimation, CsI detector [default: the
-    /// paper's point source and ideal detector]
+    /// Typical exposure of an examination: tube voltage and load, focal spot, collimation, CsI detector [default: the paper's point source
+    /// and ideal detector]
     #[arg(long, value_name = "NAME", value_parser = parser())]
     technique: Option<Technique>,
 }

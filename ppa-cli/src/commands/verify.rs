@@ -17,7 +17,7 @@ use crate::progress::ProgressArgs;
 pub struct VerifyArgs {
     /// Folder or archive of a dataset, or of a shard
     dataset: PathBuf,
-    /// Plan it was made from [default: the file beside the folder, named after it]
+    /// Plan it was made from [default: the file next to the folder, named after it]
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
     /// Share of the poses to make again and compare, at least one pose

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoneFile {
-    /// The file; relative paths start at the case file.
+    /// The file; a relative path is resolved against the folder of the case file.
     pub path: PathBuf,
     /// Which number is which bone.
     #[serde(default)]

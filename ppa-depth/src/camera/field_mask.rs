@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum FieldMask {
-    /// Corners on the horizontal axis, edges at top and bottom that are half as wide as the whole.
+    /// Corners on the horizontal axis; the edges at top and bottom are half as long as the full width.
     Hexagon {
-        /// From corner to corner.
+        /// Opening angle from corner to corner.
         width_deg: f64,
-        /// From edge to edge.
+        /// Opening angle from edge to edge.
         height_deg: f64,
     },
     /// A cone around the axis.
     Circle {
-        /// Its opening.
+        /// Opening angle of the cone.
         diameter_deg: f64,
     },
 }

@@ -68,10 +68,10 @@ pub struct CameraSpec {
     /// Tangential.
     #[serde(default)]
     pub p2: f64,
-    /// Largest √(x² + y²) for which the device gives depth; by default wherever the distortion can be inverted.
+    /// Largest √(x² + y²) for which the device gives depth; by default as far as the distortion can be inverted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metric_radius: Option<f64>,
-    /// Directions outside this figure have no depth; by default the whole image has.
+    /// Shape outside which the image has no depth; by default the whole image has depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<FieldMask>,
 }

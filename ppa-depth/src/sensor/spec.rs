@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Errors of an amplitude-modulated Time-of-Flight camera. A part that is left out does not happen.
+/// Errors of an amplitude-modulated Time-of-Flight camera. An error that is left out is not simulated.
 ///
 /// Signal S is relative to that of the reference target seen square on at 1 m: S = cos θ / (r / 1 m)², θ the angle of incidence, r the
 /// range along the ray. [`SensorSpec::default`] is not a device: it is what published limits allow (see there). Only
@@ -16,13 +16,13 @@ pub struct SensorSpec {
     /// Error that stays with the device.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub systematic: Option<SystematicError>,
-    /// Pixels at edges see several surfaces.
+    /// Pixels at edges that see several surfaces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mixed: Option<MixedPixels>,
-    /// Pixels that the device gives up.
+    /// Pixels that the device marks invalid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub invalid: Option<Invalidation>,
-    /// Light that comes back by way of another surface.
+    /// Light that returns by way of another surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub multipath: Option<Multipath>,
 }
@@ -31,7 +31,7 @@ pub struct SensorSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RandomError {
-    /// Standard deviation however much light there is, mm.
+    /// Standard deviation that remains however strong the signal, mm.
     pub floor_mm: f64,
     /// Standard deviation at S = 1, mm.
     pub at_unit_signal_mm: f64,
@@ -41,11 +41,11 @@ pub struct RandomError {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SystematicError {
-    /// Of the offset of all ranges, mm.
+    /// Standard deviation of the offset common to all ranges, mm.
     pub offset_mm: f64,
-    /// Of the error per metre of range, mm.
+    /// Standard deviation of the error per metre of range, mm.
     pub per_metre_mm: f64,
-    /// Of the offset of each pixel, mm.
+    /// Standard deviation of the offset of each pixel, mm.
     pub fixed_pattern_mm: f64,
 }
 
@@ -61,11 +61,11 @@ pub struct MixedPixels {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Invalidation {
-    /// Least signal S.
+    /// Smallest valid signal S.
     pub min_signal: f64,
-    /// Largest angle of incidence, degrees.
+    /// Largest valid angle of incidence, degrees.
     pub max_angle_deg: f64,
-    /// Least length of the sum of phasors over the sum of their lengths: 1 for one surface. Needs mixed pixels.
+    /// Smallest valid ratio of the length of the sum of phasors to the sum of their lengths, which is 1 for one surface. Needs `mixed`.
     pub min_contrast: f64,
 }
 
@@ -76,7 +76,7 @@ pub struct Invalidation {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Multipath {
-    /// Share of the light that a surface throws back.
+    /// Share of the light that a surface reflects.
     pub albedo: f64,
     /// Modulation frequency, MHz.
     pub modulation_mhz: f64,

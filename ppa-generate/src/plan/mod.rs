@@ -23,15 +23,15 @@ use crate::case_names::original_case;
 use crate::shaped_skin::ShapeSettings;
 use crate::toml_file::{other_version, relative_to, to_toml};
 
-/// Everything a dataset is made of; unknown keys are refused.
+/// Everything that determines a dataset; unknown keys are refused.
 ///
-/// In the file, relative paths are taken from its folder; in memory, from the current folder.
+/// Relative paths are resolved against the folder of the file, or, in memory, against the current folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     /// Format of this file; 1.
     pub version: u32,
-    /// Everything random follows from it.
+    /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
     /// The limbs.
@@ -43,7 +43,7 @@ pub struct Plan {
     /// Body shapes.
     #[serde(default)]
     pub shapes: ShapeSettings,
-    /// How far heel and calf sink in where they rest; a rigid skin when left out.
+    /// How deeply heel and calf are indented where they rest on the table; a rigid skin when left out.
     #[serde(default)]
     pub soft_tissue: SoftTissue,
     /// Errors of positioning: how far the limb is tilted, and how far its joint lies from the central beam.
@@ -52,8 +52,7 @@ pub struct Plan {
     /// The x-ray room.
     #[serde(default)]
     pub room: PlanRoom,
-    /// Room, device, detector and cameras from a [`RoomFile`]; reading the plan puts its contents in
-    /// place of the path.
+    /// File with room, device, detector and cameras, see [`RoomFile`]; its contents replace the path when the plan is read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub room_file: Option<PathBuf>,
     /// Depth images.

@@ -12,7 +12,7 @@ use crate::toml_file::{relative_to, to_toml};
 
 /// The fixed objects of an x-ray room; unknown keys are refused.
 ///
-/// Relative paths are taken from the folder of the file.
+/// Relative paths are resolved against the folder of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomFile {

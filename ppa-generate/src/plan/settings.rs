@@ -26,7 +26,7 @@ pub struct PlanRoom {
     pub room_from_device: Option<TransformRows>,
     /// The built-in room, and the x-ray device in either room.
     pub parametric: RoomSpec,
-    /// How the table plane is searched; when absent, it is what the central beam hits first.
+    /// How the table plane is searched for; when absent, it is the surface that the central beam hits first.
     pub table: Option<PlaneSettings>,
 }
 
@@ -45,8 +45,8 @@ pub struct DepthSettings {
     pub sensor: Option<SensorSpec>,
     /// What a camera sees where the field of view of the scan cuts the limb off: nothing (`invalid`), or a flat wall (`flat`).
     pub cut_faces: WallDepth,
-    /// Largest share of a region of interest that may see such a cut, 0 to 1, counted on the skin of the scan; a limb with
-    /// a pose above it is refused.
+    /// Largest share of a region of interest, 0 to 1, that may show a cut of the limb, measured on the skin of the scan; a limb that
+    /// exceeds it in any pose is refused.
     pub max_cut_share: f64,
 }
 
@@ -87,19 +87,18 @@ pub struct XraySettings {
     pub anode_angle_deg: f64,
     /// Filters as `MATERIAL:mm`.
     pub filters: Vec<String>,
-    /// Focal spot, heel effect and collimation; a point that fills the detector when left out.
+    /// Focal spot, heel effect and collimation; when left out, a point source collimated to the detector.
     pub source: Source,
     /// Pixels of the image.
     pub detector: Detector,
-    /// Anti-scatter grid and converter; none and an ideal one when left out.
+    /// Anti-scatter grid and converter; no grid and an ideal converter when left out.
     pub receptor: Receptor,
     /// The letter L or R on the detector; none when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub marker: Option<MarkerPlace>,
-    /// Length of limb kept along its axis on either side of the joint, or of the point that the shift of the beam gives, mm.
+    /// Length of limb kept along its axis on either side of the joint, or of the central beam if that is shifted, mm.
     pub half_length_mm: f64,
-    /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
-    /// bone edges do not come out as stairs.
+    /// Largest voxel size in photon transport, mm: thicker slices are interpolated, so that bone edges show no steps.
     pub max_voxel_mm: f64,
     /// Density between the centres of these voxels.
     pub interpolation: Interpolation,
@@ -107,7 +106,7 @@ pub struct XraySettings {
     pub form_factors: FormFactors,
     /// HU to material and density, written out as `[[xray.calibration.segment]]`.
     pub calibration: HuCalibration,
-    /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
+    /// HU to material and density from a file instead; its contents replace the path when the plan is read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration_file: Option<PathBuf>,
     /// Tube load of a radiograph, which replaces the histories of `engine`: mAs, or an exposure index for automatic exposure control.
@@ -120,8 +119,8 @@ pub struct XraySettings {
     pub analog: Option<AnalogSettings>,
     /// The mapping to a radiograph for viewing.
     pub presentation: Presentation,
-    /// Largest share of the rays around the joint that may enter or leave the scan where its field of view cuts the limb off, 0 to 1; a
-    /// limb with a pose above it is refused.
+    /// Largest share of the rays around the joint, 0 to 1, that may enter or leave the scan where its field of view cuts off the limb; a
+    /// limb that exceeds it in any pose is refused.
     #[serde(skip_serializing_if = "is_default_share")]
     pub max_cut_share: f64,
 }

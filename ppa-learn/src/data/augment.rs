@@ -14,8 +14,8 @@ use super::rotate::rotate;
 
 /// Sides of the box filter.
 const BLUR_SIDES: [usize; 3] = [3, 5, 7];
-/// How training images are changed, in this order: mirrored, turned, noised, blurred, robbed of pixels at depth edges, and
-/// cut to a square whose side lies between the network's and the prepared image's. The default is the paper's.
+/// How training images are changed, in this order: mirroring, rotation, noise, blur, removal of pixels at depth edges, and cropping to a
+/// square whose side lies between the network's and the prepared image's. The default is the paper's.
 ///
 /// Semantics follow albumentations 1.3.1 as the authors' repository uses it; noise and blur change invalid pixels as well.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -23,7 +23,7 @@ const BLUR_SIDES: [usize; 3] = [3, 5, 7];
 pub struct Augmentation {
     /// Probability of mirroring left to right.
     pub flip_probability: f64,
-    /// Probability of turning.
+    /// Probability of rotation.
     pub rotate_probability: f64,
     /// Greatest angle in degrees, to either side; angles are uniform.
     pub rotate_limit_deg: f64,

@@ -19,10 +19,10 @@ use crate::train::{ConfigError, Source, TrainConfig, merge};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentPlan {
-    /// Number of repetitions with different seeds, at most [`MAX_PAIRS`], as the permutation test takes all signs of their
-    /// differences; the paper's is 10.
+    /// Number of repetitions with different seeds, at most [`MAX_PAIRS`], as the permutation test enumerates all signs of their
+    /// differences; the paper has 10.
     pub seeds: u64,
-    /// Names the division into folds, the same for all repetitions.
+    /// Seed of the division into folds, the same for all repetitions.
     #[serde(default = "first_seed")]
     pub fold_seed: u64,
     /// Weights trained on ImageNet, by torchvision's or timm's names. Columns that begin with them are left out without it.
@@ -33,12 +33,12 @@ pub struct ExperimentPlan {
     /// What differs from [`training`](Self::training) in the runs of experiments 2a to 2c, from scratch or not.
     #[serde(default)]
     pub finetuning: toml::Table,
-    /// The synthetic dataset: of experiment 1, and to pretrain with.
+    /// The synthetic dataset, for experiment 1 and for pretraining.
     pub synthetic: Synthetic,
-    /// The preparations, or what stands for them: of experiments 2a and 2c.
+    /// The preparations, or a substitute, for experiments 2a and 2c.
     #[serde(default)]
     pub preparations: Option<Target>,
-    /// The clinical dataset, or what stands for it: of experiment 2b.
+    /// The clinical dataset, or a substitute, for experiment 2b.
     #[serde(default)]
     pub clinical: Option<Target>,
     /// Parts of the synthetic dataset to train with in the experiments on the amount of data.
@@ -53,7 +53,7 @@ pub struct ExperimentPlan {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Synthetic {
-    /// Its folder, from the folder of the plan.
+    /// Its folder, relative to that of the plan.
     pub dataset: PathBuf,
     /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -68,7 +68,7 @@ pub struct Synthetic {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
-    /// Its folder, from the folder of the plan.
+    /// Its folder, relative to that of the plan.
     pub dataset: PathBuf,
     /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -14,11 +14,11 @@ use crate::weights::{FirstConvolution, WeightsMetadata};
 
 use super::schedule::{RateSchedule, Schedule, StepCounting};
 
-/// A training, with nothing left open.
+/// Complete configuration of a training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
-    /// Names all random numbers.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Which cameras' images the network gets.
     pub views: Views,
@@ -42,19 +42,19 @@ pub struct TrainConfig {
     /// Steps of the optimiser over which the learning rate rises evenly to the highest one.
     #[serde(default)]
     pub warm_up_steps: u64,
-    /// Decay by step of the exponential moving average of the weights, which is evaluated and saved in place of the weights; 0 for
-    /// none. Decays more than 0 need `recompute_statistics`.
+    /// Decay per step of the exponential moving average of the weights, which is evaluated and saved in place of the weights; 0 for none. A
+    /// decay above 0 needs `recompute_statistics`.
     #[serde(default)]
     pub weight_average: f64,
-    /// Training batches, not augmented, whose mean statistics the normalisations have in each evaluation and in the saved weights; 0
-    /// leaves the running statistics of training. Linear probing leaves those of `start`, to which its features belong.
+    /// Number of unaugmented training batches whose mean statistics the normalisations use in each evaluation and in the saved weights; 0
+    /// keeps the running statistics of training. Linear probing keeps those of `start`, to which its features belong.
     #[serde(default)]
     pub recompute_statistics: u64,
     /// Weight of the mean squared error of the correction in the loss, in units of 30°; the network then has a second output, the
     /// medial rotation from a pose to the best one of its limb. 0 for the paper's network, which has none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub correction_weight: f64,
-    /// Draw labels that are rare in the data as often as others; else every sample alike.
+    /// Draw labels that are rare in the data as often as others; otherwise, draw every sample equally often.
     #[serde(default = "yes")]
     pub balanced: bool,
     /// Frames that are used of a recorded pose.
@@ -70,11 +70,11 @@ pub struct TrainConfig {
     pub log_every: NonZeroUsize,
     /// Steps between two checkpoints.
     pub checkpoint_every: NonZeroUsize,
-    /// Weights to begin with, from the folder of the configuration: safetensors or `.pth`, by torchvision's or timm's names. Random
-    /// ones if left out.
+    /// Initial weights, relative to the folder of the configuration: safetensors or `.pth`, with torchvision's or timm's names. Random if
+    /// left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<PathBuf>,
-    /// What becomes of a first convolution of several channels in `start`.
+    /// How a first convolution of several channels in `start` is converted.
     pub first_convolution: FirstConvolution,
     /// Layers that are trained.
     pub layers: Layers,
@@ -125,8 +125,8 @@ pub struct NetworkConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LastLayer {
-    /// As torchvision draws them, which the paper's authors use: weights uniform in ±1 / sqrt(outputs) = ±1, bias 0. Outputs begin
-    /// with errors of about 10, and a thousand steps of 10⁻³ pass until they are of the size of labels.
+    /// As torchvision draws them, which the paper's authors use: weights uniform in ±1 / sqrt(outputs) = ±1, bias 0. Outputs begin with
+    /// errors of about 10 and take a thousand steps of 10⁻³ to reach the magnitude of labels.
     Torchvision,
     /// Weights 0 and bias 2: outputs begin in the middle of the labels, 1 to 3.
     Middle,
@@ -136,7 +136,7 @@ pub enum LastLayer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
-    /// Folder of the dataset, from the folder of the configuration.
+    /// Folder of the dataset, relative to that of the configuration.
     pub dataset: PathBuf,
     /// Numbers of the persons; all of them if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -144,7 +144,7 @@ pub struct Source {
     /// Body shapes, of poses that were rotated; all of them if left out. Recorded poses have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shapes: Option<Vec<BodyShape>>,
-    /// Use every n-th angle of each limb, from the smallest, of poses that were rotated; all of them if left out.
+    /// Use every n-th angle of the rotated poses of each limb, from the smallest; all of them if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every_pose: Option<NonZeroUsize>,
     /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.

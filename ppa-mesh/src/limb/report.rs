@@ -14,10 +14,10 @@ use super::lattice::Lattice;
 pub struct Body {
     /// Whether this is the limb.
     pub chosen: bool,
-    /// Whether it could be one: it holds about as much bone as the body with the most.
+    /// Whether it could be the limb: it holds about as much bone as the body with the most.
     #[serde(default)]
     pub alike: bool,
-    /// The points for which it is kept as a part of the limb; none of other bodies.
+    /// The given points that keep it as part of the limb; empty for other bodies.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kept: Vec<[f64; 3]>,
     /// Volume of its solid core, mm³.
@@ -28,8 +28,8 @@ pub struct Body {
     pub side_cut_mm2: f64,
     /// Middle of the core in the `ct` frame, mm.
     pub centre_mm: [f64; 3],
-    /// A point of the core, `ct` frame, mm: its middle, or where that lies outside, as in a splint, the centre of the core's voxel
-    /// nearest to it. None in cases of earlier programs.
+    /// A point in the core, `ct` frame, mm: its middle, or where that lies outside, as in a splint, the centre of the nearest voxel of the
+    /// core. None in cases from earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside_mm: Option<[f64; 3]>,
 }

@@ -31,19 +31,19 @@ pub struct LimbSettings {
     /// Part of the volume to look at; all of it when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop: Option<VoxelBox>,
-    /// A point of the wanted limb in the `ct` frame, mm, when the automatic choice is not wanted.
+    /// A point in the wanted limb, `ct` frame, mm, to replace the automatic choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inside: Option<[f64; 3]>,
-    /// Points of further bodies that are kept as parts of the limb, `ct` frame, mm: a splint, or a part that only touches the
-    /// limb. Their voxels are those of the limb in all that follows.
+    /// Points in other bodies that are kept as parts of the limb, `ct` frame, mm: a splint, or a part that only touches the limb. Their
+    /// voxels then count as voxels of the limb.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub kept: Vec<[f64; 3]>,
-    /// Balls of the scan in which nothing is limb: they cut something off. Of what a cut separates, the limb is the body that is chosen.
-    /// A ball that the limb encloses on all sides stays limb, as any hollow does.
+    /// Balls in which nothing counts as limb, to cut something off. If that separates bodies, the limb is the one that is chosen. A ball
+    /// that the limb encloses on all sides remains limb, like any cavity.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub removed: Vec<Ball>,
-    /// Of several limbs alike, side by side in this direction of the `ct` frame, take the one farthest along it;
-    /// when absent the one with the most bone.
+    /// Direction in the `ct` frame: of several similar limbs side by side along it, the one farthest along it is taken; when absent, the
+    /// one with the most bone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub towards: Option<[f64; 3]>,
     /// HU that only bone (or metal) exceeds in bulk; the limb is what holds most of it.
@@ -52,15 +52,13 @@ pub struct LimbSettings {
     pub core_hu: f64,
     /// Structures thinner than twice this (couch shells, sheets) are not limb, mm.
     pub core_radius_mm: f64,
-    /// Two bodies touch rather than being one when the neck between them is thinner than this
-    /// fraction of the thinner body.
+    /// Two bodies count as touching, not as one, when the neck between them is thinner than this fraction of the thinner body.
     pub neck_ratio: f64,
-    /// A column along the scan axis may be couch when it is solid in at least this fraction of slices;
-    /// above 1 nothing is.
+    /// Smallest fraction of slices in which a column along the scan axis must be solid to be considered couch; above 1, none is.
     pub couch_persistence: f64,
     /// Couch shells are thinner than this across the scan axis, mm.
     pub couch_thickness_mm: f64,
-    /// Neighbourhood of the clustering that drops specks of surface, mm.
+    /// Neighbourhood radius of the clustering that removes specks of surface, mm.
     pub dbscan_eps_mm: f64,
     /// Points within that neighbourhood that make a core point.
     pub dbscan_min_points: usize,

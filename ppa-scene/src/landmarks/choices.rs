@@ -14,11 +14,11 @@ pub struct LandmarkOverrides {
     pub limb: Option<LimbKind>,
     /// The joint centre, `ct` frame, mm; the axis is moved parallel to itself to pass through it.
     pub joint_centre: Option<[f64; 3]>,
-    /// Distances proximal of the joint level where the joint region begins and ends, mm; below 0 distal of a knee.
+    /// Start and end of the joint region, mm proximal to the joint level; below 0, distal to a knee.
     pub joint_region: Option<[f64; 2]>,
     /// The same for the calf region.
     pub calf_region: Option<[f64; 2]>,
-    /// What the region centres are centres of.
+    /// What the region centres are taken from.
     pub axis_source: Option<AxisSource>,
     /// Two points that the axis runs through, `ct` frame, mm, instead of the regions' centres. The joint
     /// is then the point of this axis nearest to [`Self::joint_centre`], or at the joint's level.

@@ -17,7 +17,7 @@ pub struct FoundJoint {
     pub joint: Joint,
     /// Where, mm: the point of the tibia's shaft in the gap of an ankle, the middle of the plateau in that of a knee.
     pub centre_mm: [f64; 3],
-    /// How clear its gap is: how much less dense than the thinner plate of bone beside it, HU.
+    /// How clear the joint space is: how much less dense than the thinner bone plate next to it, HU.
     pub gap_depth_hu: f64,
     /// What else is known of a knee.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -28,9 +28,9 @@ pub struct FoundJoint {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KneeLines {
-    /// Through the middle of the gaps of both compartments, seen from the front, towards the patient's right.
+    /// Line through the middle of both compartments' joint spaces, seen from the front, towards the patient's right.
     pub joint_line: [f64; 3],
-    /// To the front, square to the posterior condylar line; `None` when the scan cuts the back of a condyle.
+    /// Anterior direction, perpendicular to the posterior condylar line; `None` when the scan cuts the back of a condyle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub anterior: Option<[f64; 3]>,
     /// Whether the scan cuts the tibial plateau: the joint centre is less certain then.
@@ -53,7 +53,7 @@ pub enum AxisSource {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxisRegion {
-    /// First and last distance proximal of the joint level along the scan's limb direction, mm; distal of it below 0.
+    /// First and last distance proximal to the joint level along the scan's limb direction, mm; below 0, distal to it.
     pub range_mm: [f64; 2],
     /// Mean of the cross-section centres, or the given point of the axis, `ct` frame, mm.
     pub centre_mm: [f64; 3],
@@ -67,10 +67,10 @@ pub struct Landmarks {
     pub side: Side,
     /// What was recognised.
     pub limb: LimbKind,
-    /// What the two region centres are centres of.
+    /// What the two region centres are taken from.
     pub axis_source: AxisSource,
-    /// Unit direction across the slices, towards proximal: the scan's own, or across a shaft that
-    /// leans in them by more than 3 degrees; region ranges run along it.
+    /// Unit normal of the slices, towards proximal: of the scan's own, or, where the shaft is inclined by more than 3 degrees, of slices
+    /// across the shaft; region ranges run along it.
     pub scan_direction: [f64; 3],
     /// The region next to the joint: proximal of an ankle, on either side of a knee.
     pub joint_region: AxisRegion,
@@ -80,16 +80,16 @@ pub struct Landmarks {
     pub axis_point: [f64; 3],
     /// Unit direction of the rotation axis, towards proximal.
     pub axis_direction: [f64; 3],
-    /// Direction that faces up at angle 0; only its part across the axis counts.
+    /// Direction that faces up at angle 0; only its component perpendicular to the axis counts.
     pub anterior: [f64; 3],
     /// The point of the axis at the level of the joint: origin of the patient frame.
     pub joint_centre: [f64; 3],
     /// One distal and two proximal points of the plane Π_P under the limb.
     pub plane_points: [[f64; 3]; 3],
-    /// What was decided on the way and why; files have it as findings of the limb.
+    /// What was decided and why; files contain it as findings of the limb.
     #[serde(skip)]
     pub notes: Vec<LandmarkNote>,
-    /// The joints that were found, from distal to proximal; none were looked for in another limb.
+    /// The joints that were found, from distal to proximal; none are searched for in a limb that was given as `other`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<FoundJoint>,
 }

@@ -16,11 +16,11 @@ const MOST_SHIFT_MM: f64 = 300.0;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Positioning {
-    /// Tilt beyond that at which the limb rests on two places, about the axis across the table through the joint, degrees:
-    /// above 0 the proximal end is lifted, below 0 the distal end. What holds that end up is not modelled.
+    /// Tilt from the pose in which the limb rests on two places, about the axis across the table through the joint, degrees: above 0 the
+    /// proximal end is lifted, below 0 the distal end. What holds that end up is not modelled.
     pub tilt_deg: f64,
-    /// From the joint to the central beam, mm: across the table, towards the left of a patient who lies on the back, and along it, towards
-    /// the head; x and y of the built-in room. Right and left limbs are shifted alike.
+    /// Offset of the central beam from the joint, mm: across the table, towards the left of a supine patient, and along it, towards the
+    /// head; x and y of the built-in room. It is the same for right and left limbs.
     pub beam_shift_mm: [f64; 2],
 }
 

@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 use crate::placement::error::PlaceError;
 use crate::room::plane::Plane;
 
-/// How far the two parts of a limb that rest on the table sink in: heel and calf of a lower leg.
+/// How deeply the two parts of a limb that rest on the table are indented: heel and calf of a lower leg.
 ///
 /// The default is a rigid skin, as in the paper.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SoftTissue {
-    /// Depth of the distal contact, mm.
+    /// Indentation depth at the distal contact, mm.
     pub distal_mm: f64,
-    /// Depth of the proximal contact, mm.
+    /// Indentation depth at the proximal contact, mm.
     pub proximal_mm: f64,
 }
 

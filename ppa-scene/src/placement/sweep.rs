@@ -12,7 +12,7 @@ pub struct Sweep {
     pub from_deg: f64,
     /// Last angle, degrees.
     pub to_deg: f64,
-    /// Distance of neighbouring angles, degrees.
+    /// Step between angles, degrees.
     pub step_deg: f64,
 }
 

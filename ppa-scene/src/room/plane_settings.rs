@@ -8,11 +8,11 @@ use crate::room::device::XrayDevice;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlaneSettings {
-    /// Distance from the plane up to which a point belongs to it, mm.
+    /// Largest distance from the plane of a point that belongs to it, mm.
     pub threshold_mm: f64,
     /// Planes tried per search.
     pub iterations: u32,
-    /// The direction that is up; the normal of the result points there.
+    /// Upward direction, to which the normal of the result points.
     pub up: [f64; 3],
     /// Largest angle between normal and up, degrees.
     pub max_tilt_deg: f64,
@@ -20,12 +20,12 @@ pub struct PlaneSettings {
     pub cell_mm: f64,
     /// Smallest area of a table top, mm².
     pub min_area_mm2: f64,
-    /// Only points in this box (low and high corner) are looked at, mm.
+    /// Box to search in (low and high corner), mm.
     pub region: Option<[[f64; 3]; 2]>,
     /// Central beam: the source and a direction. The table is the first large patch that it hits;
     /// without a beam it is the largest patch.
     pub beam: Option<[[f64; 3]; 2]>,
-    /// How far from the source the table is at least, mm: keeps collimator and housing out.
+    /// Smallest distance from the source to the table, mm: excludes collimator and housing.
     pub min_beam_mm: f64,
 }
 

@@ -22,7 +22,7 @@ pub struct RoomSpec {
     pub table_thickness_mm: f64,
     /// Height of the table top above the floor.
     pub table_height_mm: f64,
-    /// How much of the table lies beyond the central beam on the patient's foot side.
+    /// Length of the table beyond the central beam on the patient's foot side.
     pub table_foot_mm: f64,
     /// Distance of the detector from the source.
     pub source_detector_mm: f64,
@@ -32,13 +32,13 @@ pub struct RoomSpec {
     pub detector_side_mm: f64,
     /// Distance of the tube column from the central beam, towards −x.
     pub column_distance_mm: f64,
-    /// Distance of the wall behind the column, towards −x.
+    /// Distance of the wall behind the column from the central beam, towards −x.
     pub back_wall_mm: f64,
-    /// Distance of the wall at the head end, towards +y.
+    /// Distance of the wall at the head end from the central beam, towards +y.
     pub head_wall_mm: f64,
-    /// Height of floor to ceiling: the walls' height.
+    /// Height of the walls, from floor to ceiling.
     pub wall_height_mm: f64,
-    /// Distance of neighbouring points of the cloud.
+    /// Spacing of the points of the cloud.
     pub point_spacing_mm: f64,
 }
 

@@ -4,24 +4,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::setters::setters;
 
-/// What stands in the detector plane. The default takes the whole energy of every photon.
+/// Image receptor in the detector plane. The default absorbs the whole energy of every photon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Receptor {
     /// What turns photons into signal.
     pub model: DetectorModel,
-    /// Swank factor of the collection of light or charge, which depends on the depth of an interaction: ⟨ε⟩²/⟨ε²⟩ of photons that leave equal
-    /// energies. 1 adds no noise. Columnar CsI has 0.91 to 0.93: Zhao, Ristić and Rowlands, Med. Phys. 31 (2004) 2594.
+    /// Swank factor of the collection of light or charge, which depends on the depth of an interaction: ⟨ε⟩²/⟨ε²⟩ for photons that deposit
+    /// equal energies. 1 adds no noise. Columnar CsI has 0.91 to 0.93: Zhao, Ristić and Rowlands, Med. Phys. 31 (2004) 2594.
     #[serde(skip_serializing_if = "is_one")]
     pub collection_swank: f64,
     /// Anti-scatter grid on top.
     pub grid: Option<AntiScatterGrid>,
-    /// Blur of the converter; none for sharp pixels.
+    /// Blur of the converter; when left out, pixels are sharp.
     pub blur: Option<Blur>,
     /// Standard deviation of the electronic noise of a pixel, as energy in the converter, keV.
     pub electronic_noise_kev: f64,
-    /// Standard deviation of the gain of pixels about 1 that calibration leaves, 0 to 0.2: the same pattern in every image of a panel.
+    /// Standard deviation of the pixel gains about 1 that remains after calibration, 0 to 0.2; the pattern is the same in every image of a
+    /// panel.
     #[serde(skip_serializing_if = "is_zero")]
     pub gain_error: f64,
     /// Serial number of the panel, which selects the gains.
@@ -74,16 +75,17 @@ pub(crate) fn is_first(panel: &u32) -> bool {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Blur {
-    /// 1 / (1 + H f²), as scintillators have it.
+    /// 1 / (1 + H f²), as for scintillators.
     ///
-    /// H = 0.45 mm² is 0.6 mm of columnar CsI: with pixels of 0.127 mm, Samei, Image quality in two phosphor-based flat panel
-    /// digital radiographic detectors, Med. Phys. 30 (2003) 1747, found a presampled MTF of 0.2 at 2.5/mm and 0.1 at
-    /// 3.8/mm; this gives 0.22 and 0.09.
+    /// H = 0.45 mm² corresponds to 0.6 mm of columnar CsI: with pixels of 0.127 mm, Samei, Image quality in two phosphor-based flat panel
+    /// digital radiographic detectors, Med. Phys. 30 (2003) 1747, found a presampled MTF of 0.2 at 2.5/mm and 0.1 at 3.8/mm; this gives
+    /// 0.22 and 0.09.
     Lorentzian {
         /// H, mm².
         h_mm2: f64,
-        /// H of the noise, mm², 0 to that of the signal: the normalised noise power of the converter is 1 / (1 + H f²)². Less than that of the signal where
-        /// the blur depends on the depth of the interaction (Lubberts, J. Opt. Soc. Am. 58 (1968) 1475); the DQE falls by the ratio MTF² over noise power. None for the H of the signal.
+        /// H of the noise, mm², 0 to that of the signal: the normalised noise power of the converter is 1 / (1 + H f²)². Less than that of
+        /// the signal where the blur depends on the depth of the interaction (Lubberts, J. Opt. Soc. Am. 58 (1968) 1475); the DQE falls by
+        /// the ratio of MTF² to noise power. When left out, the H of the signal.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         noise_h_mm2: Option<f64>,
     },
@@ -93,7 +95,8 @@ pub enum Blur {
         per_mm: Vec<f64>,
         /// Values, 1 at frequency 0 and falling.
         mtf: Vec<f64>,
-        /// Noise transfer at the frequencies: the root of the normalised noise power of the converter, without aperture and aliases. Nowhere below the MTF. None for the MTF.
+        /// Noise transfer at the frequencies: the root of the normalised noise power of the converter, without aperture and aliases.
+        /// Nowhere below the MTF. When left out, the MTF.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         noise: Option<Vec<f64>>,
     },
@@ -156,14 +159,14 @@ pub struct AntiScatterGrid {
     /// Material of the spaces.
     #[serde(default = "default_interspace")]
     pub interspace: String,
-    /// Distance of the line that the strips point to, mm; none for parallel strips. The grid is centred on the detector.
+    /// Distance of the line that the strips point to, mm; when left out, strips are parallel. The grid is centred on the detector.
     #[serde(default)]
     pub focus_mm: Option<f64>,
     /// Device axis that the strips run along.
     #[serde(default)]
     pub lines_along: LinesAlong,
-    /// Whether the grid moves during the exposure: images then have the mean over the phase of the strips. A stationary grid, with one strip on the centre of the detector, leaves
-    /// its lines in the image, and moiré where the pixels do not resolve them.
+    /// Whether the grid moves during the exposure, which averages images over the phase of the strips. A stationary grid, with one strip at
+    /// the centre of the detector, leaves its lines in the image, and moiré where the pixels do not resolve them.
     #[serde(default = "moves", skip_serializing_if = "is_true")]
     pub moving: bool,
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::beam::field::Field;
 use crate::setters::setters;
 
-/// What the tube adds to a point that sends the same photons everywhere.
+/// What distinguishes the tube from a point that emits the same photons in all directions.
 ///
 /// The default is that point, collimated to the detector.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -18,14 +18,14 @@ pub struct Source {
     pub focal_spot: FocalSpot,
     /// Which part of the detector plane photons are sent to.
     pub collimation: Collimation,
-    /// Distance of the collimator blades from the focal spot along device z, mm: an extended spot gives the field a penumbra.
-    /// None for sharp edges.
+    /// Distance of the collimator blades from the focal spot along device z, mm: an extended spot gives the field a penumbra. Without it,
+    /// edges are sharp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blades_mm: Option<f64>,
     /// Extrafocal radiation; needs `blades_mm`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extrafocal: Option<Extrafocal>,
-    /// Intensity and spectrum by angle to the anode; without it both are those of the central ray.
+    /// Dependence of intensity and spectrum on the angle to the anode; without it, both are those of the central ray.
     pub heel_effect: Option<HeelEffect>,
 }
 
@@ -45,7 +45,7 @@ pub struct FocalSpot {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SpotShape {
-    /// Even over a square.
+    /// Uniform over a square.
     #[default]
     Uniform,
     /// A Gaussian, the same in all directions.
@@ -59,10 +59,10 @@ pub enum SpotShape {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Extrafocal {
-    /// Photons per solid angle over those of the focal spot, where the blades cover neither. Ali and Rogers, Med. Phys. 35 (2008) 4149,
-    /// find up to 0.11 of the exposure for tubes of radiography.
+    /// Photons per solid angle relative to those of the focal spot, where the blades cover neither. Ali and Rogers, Med. Phys. 35 (2008)
+    /// 4149, find up to 0.11 of the exposure for radiography tubes.
     pub ratio: f64,
-    /// Side of the square around the middle of the focal spot that they leave from, in the plane of the spot, mm.
+    /// Side of the square that the extrafocal photons leave from, centred on the focal spot in its plane, mm.
     pub size_mm: f64,
 }
 
@@ -82,7 +82,7 @@ pub enum Collimation {
         #[serde(default)]
         centre_mm: [f64; 2],
     },
-    /// A rectangle by its opening angles seen from the source, half to either side of device z, as the fan beam of MC-GPU.
+    /// A rectangle given by its opening angles at the source, half to either side of device z, like the fan beam of MC-GPU.
     Fan {
         /// Full angles in the planes of device x and y, degrees.
         angles_deg: [f64; 2],
@@ -94,7 +94,7 @@ pub enum Collimation {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct HeelEffect {
-    /// Where the anode is seen from the cathode: degrees from device x towards device y.
+    /// Direction from the cathode to the anode: degrees from device x towards device y.
     pub anode_towards_deg: f64,
 }
 

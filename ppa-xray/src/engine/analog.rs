@@ -34,7 +34,7 @@ use crate::transport::tracking::TransportError;
 pub struct AnalogSettings {
     /// Photons emitted into the field.
     pub histories: u64,
-    /// Seed of the image: history n of a seed is the same whatever runs beside it.
+    /// Seed of the image: history n of a seed is the same whatever runs in parallel.
     pub seed: u64,
     /// How photons scatter off electrons.
     pub compton_model: ComptonModel,

@@ -13,14 +13,14 @@ use crate::transport::tracking::TransportError;
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct FastSettings {
-    /// Histories whose quantum noise the image carries; infinite gives the expected image.
+    /// Histories whose quantum noise the image has; infinite gives the expected image.
     pub dose_histories: f64,
-    /// Histories that are followed to find multiple scatter; half as many first collisions are listed, which is where they
-    /// start and what single scatter is summed from. The scatter's error falls with the root of it.
+    /// Histories followed for multiple scatter; they start from half as many recorded first collisions, from which single scatter is
+    /// summed. The error of the scatter falls with the square root of this number.
     pub scatter_histories: u64,
-    /// Largest distance of the points at which scatter is computed, mm.
+    /// Largest spacing of the points at which scatter is computed, mm.
     pub scatter_pixel_mm: f64,
-    /// Most rays per pixel side of the primary, where the image has edges.
+    /// Largest number of primary rays per pixel side, where the image has edges.
     pub samples_per_side: u32,
     /// How photons scatter off electrons.
     pub compton_model: ComptonModel,

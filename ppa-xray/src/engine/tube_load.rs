@@ -19,7 +19,8 @@ use crate::transport::tracking::TransportError;
 pub enum TubeLoad {
     /// Tube current times exposure time, mAs.
     Mas(f64),
-    /// Automatic exposure control: what gives this exposure index (IEC 62494-1), see [`Radiograph::exposure_index`](crate::Radiograph::exposure_index).
+    /// Automatic exposure control: the load that gives this exposure index (IEC 62494-1), see
+    /// [`Radiograph::exposure_index`](crate::Radiograph::exposure_index).
     ExposureIndex(f64),
 }
 

@@ -64,11 +64,11 @@ pub struct Presentation {
     pub width: f64,
     /// Latitude reduction: contrast of large areas and strong edges is divided by 1 + this × log exposure; 0 leaves it as it is.
     pub latitude_reduction: f64,
-    /// Share of the contrast of faint detail that is added; 0 leaves it as it is in log exposure.
+    /// Share by which the contrast of faint detail is increased; 0 leaves it as it is in log exposure.
     pub detail: f64,
-    /// Size from which detail gets less than half of the lift, mm.
+    /// Size above which detail gets less than half of the enhancement, mm.
     pub detail_mm: f64,
-    /// Local contrast (root mean square) in log exposure from which detail gets less than half of the lift, so that strong edges
+    /// Local contrast (root mean square) in log exposure above which detail gets less than half of the enhancement, so that strong edges
     /// get no halo.
     pub edge: f64,
 }
@@ -124,11 +124,11 @@ struct PresentationTable {
     width: Option<f64>,
     /// Latitude reduction: contrast of large areas and strong edges is divided by 1 + this × log exposure; 0 leaves it as it is.
     latitude_reduction: Option<f64>,
-    /// Share of the contrast of faint detail that is added; 0 leaves it as it is in log exposure.
+    /// Share by which the contrast of faint detail is increased; 0 leaves it as it is in log exposure.
     detail: Option<f64>,
-    /// Size from which detail gets less than half of the lift, mm.
+    /// Size above which detail gets less than half of the enhancement, mm.
     detail_mm: Option<f64>,
-    /// Local contrast (root mean square) in log exposure from which detail gets less than half of the lift.
+    /// Local contrast (root mean square) in log exposure above which detail gets less than half of the enhancement.
     edge: Option<f64>,
 }
 

@@ -16,7 +16,7 @@ pub struct Segment {
     pub from_hu: Option<f32>,
     /// What it is made of.
     pub composition: Composition,
-    /// Knots [HU, g/cm³] of the density: straight in between, constant outside.
+    /// Knots [HU, g/cm³] of the density: linear in between, constant outside.
     pub density: Vec<[f32; 2]>,
 }
 
@@ -38,7 +38,7 @@ pub enum Composition {
 pub struct Constituent {
     /// The material.
     pub material: String,
-    /// Density of a voxel that holds nothing else, g/cm³.
+    /// Density of a voxel of this material alone, g/cm³.
     pub density_g_cm3: f32,
 }
 
@@ -128,10 +128,10 @@ struct SegmentTable {
     /// Name of a material of the library, or its mass fractions; either this or `mixture`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     material: Option<String>,
-    /// Knots [HU, g/cm³] of the density: straight in between, constant outside.
+    /// Knots [HU, g/cm³] of the density: linear in between, constant outside.
     density: Vec<[f32; 2]>,
     // Last, since TOML wants tables after plain values.
-    /// Two materials, from the first to the second as the density goes from that of the first to that of the second.
+    /// Two materials: the mixture goes from the first to the second as the density goes from that of the first to that of the second.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     mixture: Option<[Constituent; 2]>,
 }

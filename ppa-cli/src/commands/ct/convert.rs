@@ -33,13 +33,13 @@ pub struct ConvertArgs {
     /// Keep only this box of the scan's voxels: first and one past the last index along i, j and k
     #[arg(long, value_name = "I,I,J,J,K,K", value_parser = voxel_box)]
     crop: Option<VoxelBox>,
-    /// Shift the slices of a tilted gantry onto a lattice with right angles; corners become air
+    /// Shift the slices of a tilted-gantry scan onto a rectangular grid; corners become air
     #[arg(long)]
     upright: bool,
     /// Keep only the voxels whose centres lie in this box: from and to along x, y and z, LPS
     #[arg(long, value_name = "X,X,Y,Y,Z,Z", value_parser = world_box, allow_hyphen_values = true)]
     crop_mm: Option<[[f64; 3]; 2]>,
-    /// Distance of the new voxels' centres: one number, or three for i, j and k
+    /// Voxel spacing to resample to: one number, or three for i, j and k
     #[arg(long, value_name = "MM", value_parser = along_axes, allow_hyphen_values = true)]
     spacing_mm: Option<[f64; 3]>,
     #[command(flatten)]

@@ -16,7 +16,7 @@ use crate::side_name::SideName;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LimbName {
-    /// Lower leg and foot: P01 to P17, or any by seed
+    /// Lower leg and foot: P01 to P17, or a random one by seed
     LowerLeg,
     /// Knee: one simple shape
     Knee,
@@ -39,10 +39,10 @@ pub struct PhantomArgs {
     /// What to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
     #[arg(long)]
     out: PathBuf,
-    /// Lower leg of the table: P01 to P17 [default: P01]
+    /// Built-in lower leg: P01 to P17 [default: P01]
     #[arg(long, conflicts_with = "seed")]
     name: Option<String>,
-    /// Lower leg drawn by this seed instead
+    /// Draw a random lower leg from this seed instead
     #[arg(long)]
     seed: Option<u64>,
     /// Side of the body
@@ -54,13 +54,13 @@ pub struct PhantomArgs {
     /// Put a titanium plate with five screws on the fibula
     #[arg(long)]
     plate: bool,
-    /// Also write which bone each voxel belongs to, 0 for none: as --out, but not as DICOM
+    /// Also write the bone label of each voxel, 0 for none; formats as for --out, except DICOM
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
     /// Side of the cubic voxels in mm
     #[arg(long, default_value_t = 0.8)]
     spacing_mm: f64,
-    /// Let the limb lie on a table top
+    /// Place the limb on a table top
     #[arg(long)]
     table: bool,
     /// Blur of a scanner: full width at half maximum in mm

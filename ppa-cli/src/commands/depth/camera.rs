@@ -12,13 +12,13 @@ use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct CameraArgs {
-    /// Raw calibration JSON of an Azure Kinect or Orbbec camera, Orbbec parameters as JSON (read by the field names of the SDK,
-    /// not tried on a file of a device), OpenCV YAML, or a camera JSON [default: an Azure Kinect]
+    /// Raw calibration JSON of an Azure Kinect or Orbbec camera, Orbbec parameters as JSON (read by the field names of the SDK, not tested
+    /// with a file from a device), OpenCV YAML, or a camera JSON [default: an Azure Kinect]
     calibration: Option<PathBuf>,
-    /// Depth mode; matters for raw calibrations, which hold for the whole sensor
+    /// Depth mode; used for raw calibrations, which describe the whole sensor
     #[arg(long, value_enum, default_value_t = Mode::NfovUnbinned)]
     mode: Mode,
-    /// Leave out what the mode's illumination does not reach: outside a hexagon (narrow) or a circle (wide)
+    /// Mask directions that the mode's illumination does not reach: outside a hexagon (narrow) or a circle (wide)
     #[arg(long)]
     mask: bool,
     /// Camera JSON to write

@@ -41,7 +41,7 @@ pub struct CoverageArgs {
     /// Try these places instead: JSON, [{"name": …, "room_from_camera": row-major 4x4, mm}, …]
     #[arg(long, conflicts_with_all = ["distances_mm", "step_deg", "lowest_deg"])]
     places: Option<PathBuf>,
-    /// Surface within this distance of the joint counts, mm
+    /// Distance from the joint within which the surface counts, mm
     #[arg(long, default_value_t = CoverageSettings::default().radius_mm)]
     radius_mm: f64,
     /// Largest angle of incidence, degrees

@@ -67,14 +67,14 @@ pub struct RenderArgs {
     /// Camera JSON [default: an Azure Kinect, 640 x 576]
     #[arg(long)]
     pub(super) camera: Option<PathBuf>,
-    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm, or what --frames of `ppa scene place`
-    /// or `ppa scene room` wrote, with --motion [default: identity]
+    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm, or a file written by --frames of `ppa scene
+    /// place` or `ppa scene room`, with --motion [default: identity]
     #[arg(long)]
     pub(super) camera_from_mesh: Option<PathBuf>,
     /// Which motion of that file: left_from_room for a room or a placed skin, left_from_ct for a skin in the scan
     #[arg(long, value_name = "NAME", requires = "camera_from_mesh")]
     pub(super) motion: Option<String>,
-    /// Image to write: 16-bit PNG, Z in mm, 0 invalid; of several frames name_0000.png, name_0001.png …; of a case
+    /// Image to write: 16-bit PNG, Z in mm, 0 invalid; several frames become name_0000.png, name_0001.png …; a case gives
     /// name_left.png and name_right.png unless --view chooses one
     #[arg(long)]
     pub(super) out: PathBuf,
@@ -93,13 +93,13 @@ pub struct RenderArgs {
     /// Seed of the sensor's noise and of the tremor
     #[arg(long, default_value_t = 0)]
     pub(super) seed: u64,
-    /// Frames of a recording
+    /// Number of frames to record
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub(super) frames: u64,
-    /// Size of the meshes' motion between frames along each axis, mm (standard deviation)
+    /// Standard deviation of the meshes' motion between frames along each axis, mm
     #[arg(long, default_value_t = 0.0)]
     pub(super) tremor_mm: f64,
-    /// Size of their rotation about each axis, degrees (standard deviation)
+    /// Standard deviation of the meshes' rotation about each axis, degrees
     #[arg(long, default_value_t = 0.0)]
     pub(super) tremor_deg: f64,
     #[command(flatten)]

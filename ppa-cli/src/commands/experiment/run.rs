@@ -60,10 +60,10 @@ pub struct RunArgs {
     /// Folder of the trainings and tables
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Make only shard k of n, and no tables
+    /// Run only shard k of n, and write no tables
     #[arg(long, value_name = "K/N")]
     shard: Option<Part>,
-    /// Make only these columns of the table, by the names of the folders of trainings (such as scratch,specific-size), and no tables
+    /// Run only these columns of the table, by the names of their training folders (such as scratch,specific-size), and write no tables
     #[arg(
         long,
         value_name = "NAMES",
@@ -71,7 +71,7 @@ pub struct RunArgs {
         conflicts_with = "so_far"
     )]
     columns: Vec<String>,
-    /// Write tables of what there is, marked as incomplete, and train nothing
+    /// Write tables of the results so far, marked as incomplete, without training
     #[arg(long, conflicts_with = "shard")]
     so_far: bool,
     #[command(flatten)]

@@ -45,7 +45,7 @@ and of the strict one:
 pub struct AutoArgs {
     /// Folder of a dataset
     dataset: PathBuf,
-    /// Plan it was made from [default: the file beside the folder, named after it]
+    /// Plan it was made from [default: the file next to the folder, named after it]
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
     /// Scale of the labels: graded or strict

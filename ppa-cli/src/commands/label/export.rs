@@ -27,7 +27,7 @@ pub struct ExportArgs {
     /// Folder for readers
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The key, outside of that folder [default: beside it, with .key.csv added to its name]
+    /// Key file, outside that folder [default: next to it, with .key.csv added to its name]
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
     /// Seed of names and order; give each reader a seed of their own for a different order

@@ -31,8 +31,8 @@ pub struct AnalogArgs {
     /// Follow part k of n only; `ppa xray merge` joins the tallies of all parts
     #[arg(long, value_name = "K/N", requires = "tally", conflicts_with_all = ["time", "target_error"])]
     part: Option<Part>,
-    /// Keep the tallies in this file: saved every minute and at the end, to resume from and to merge. Without it, a run that is
-    /// stopped by Ctrl-C or TERM leaves them beside the first image, as x.png.tally
+    /// Keep the tallies in this file: saved every minute and at the end, to resume from and to merge. Without it, a run stopped by Ctrl-C
+    /// or TERM leaves them next to the first image, as x.png.tally
     #[arg(long, value_name = "FILE")]
     pub tally: Option<PathBuf>,
     /// Resume from the tally file, if it exists, and replace the images of the earlier run

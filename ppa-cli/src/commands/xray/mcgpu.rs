@@ -24,25 +24,25 @@ use crate::output_files::{ReplaceArgs, require_room};
 
 #[derive(Debug, Args)]
 pub struct McgpuArgs {
-    /// Input file of MC-GPU v1.3; a material line `ppa:NAME` takes a built-in material
+    /// Input file of MC-GPU v1.3; a material line `ppa:NAME` selects a built-in material
     input: PathBuf,
     /// Engine; doses need the analog one
     #[arg(long, value_enum, default_value = "analog")]
     engine: EngineName,
-    /// Histories of each projection: followed (analog) or whose noise the image carries (fast) [default: as the file says]
+    /// Histories of each projection: to follow (analog), or whose noise the image has (fast) [default: as in the file]
     #[arg(long)]
     histories: Option<f64>,
     /// Seed of histories and noise [default: that of the file]
     #[arg(long)]
     seed: Option<u64>,
-    /// Folder for images and doses; they get the names that the file gives them. Until the scan is complete, IMAGE.tally in this
-    /// folder keeps what is simulated; the same command resumes from it
+    /// Folder for images and doses, named as in the file. Until the scan is complete, IMAGE.tally in this folder keeps what has been
+    /// simulated; the same command resumes from it
     #[arg(long)]
     out: PathBuf,
     /// Follow only part k of n of the histories of each projection; --out gets tallies for --merge, no images
     #[arg(long, value_name = "K/N")]
     part: Option<Part>,
-    /// Take the histories from these folders of --part, all of them, and follow none
+    /// Combine the histories in these --part folders, one for each part, and follow none
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "part")]
     merge: Vec<PathBuf>,
     #[command(flatten)]

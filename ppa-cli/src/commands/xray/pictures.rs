@@ -22,10 +22,10 @@ pub struct PictureArgs {
     /// Radiograph to write: DICOM Digital X-Ray image, flagged as synthetic
     #[arg(long, value_name = "FILE")]
     pub dicom: Option<PathBuf>,
-    /// Make the DICOM image one For Processing: detector signal instead of the picture
+    /// Write the DICOM image For Processing: detector signal instead of the presentation
     #[arg(long, requires = "dicom")]
     for_processing: bool,
-    /// Exposure index that the examination aims at, for the deviation index of IEC 62494-1; no standard gives one
+    /// Target exposure index of the examination, for the deviation index of IEC 62494-1; no standard specifies one
     #[arg(long, value_name = "EI", value_parser = target_exposure_index)]
     target_exposure_index: Option<f64>,
 }

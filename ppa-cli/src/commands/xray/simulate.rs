@@ -49,7 +49,7 @@ pub struct SimulateArgs {
     /// Engine
     #[arg(long, value_enum, default_value = "fast")]
     engine: EngineName,
-    /// Histories: followed (analog) or whose noise the image carries (fast) [default: 2e7 or 2e10]
+    /// Histories: to follow (analog), or whose noise the image has (fast) [default: 2e7 or 2e10]
     #[arg(long)]
     histories: Option<f64>,
     /// Tube load in mAs, in place of histories
