@@ -106,7 +106,10 @@ fn a_room_without_a_table_is_refused() {
     fs::write(folder.path().join("room.ply"), ply).unwrap();
     write_plan(folder.path(), "[room]\nply = \"room.ply\"\n");
     contains(
-        &fail(folder.path(), "generate plan.toml --out data"),
+        &fail(
+            folder.path(),
+            "generate plan.toml --out data --progress quiet",
+        ),
         &["no plane"],
     );
     assert_eq!(names(folder.path()), ["plan.toml", "room.ply"]);
@@ -125,7 +128,10 @@ fn a_camera_that_sees_nothing_is_refused() {
     ]);
     fs::write(folder.path().join("rig.json"), rig.to_string()).unwrap();
     write_plan(folder.path(), "[depth]\nrig = \"rig.json\"\n");
-    let said = fail(folder.path(), "generate plan.toml --out data");
+    let said = fail(
+        folder.path(),
+        "generate plan.toml --out data --progress quiet",
+    );
     contains(&said, &["camera"]);
     assert!(!folder.path().join("data/manifest.jsonl").exists());
 }
@@ -170,7 +176,10 @@ fn a_rig_or_a_room_that_cannot_be_used_is_named() {
     rig["left"]["device_from_camera"][0][1] = serde_json::json!(0.3);
     fs::write(folder.path().join("rig.json"), rig.to_string()).unwrap();
     write_plan(folder.path(), "[depth]\nrig = \"rig.json\"\n");
-    let said = fail(folder.path(), "generate plan.toml --out data");
+    let said = fail(
+        folder.path(),
+        "generate plan.toml --out data --progress quiet",
+    );
     contains(&said, &["rig.json", "left camera"]);
 
     // A table whose points are all there twice: discs of no radius.
@@ -182,6 +191,9 @@ fn a_rig_or_a_room_that_cannot_be_used_is_named() {
     }
     fs::write(folder.path().join("room.ply"), ply).unwrap();
     write_plan(folder.path(), "[room]\nply = \"room.ply\"\n");
-    let said = fail(folder.path(), "generate plan.toml --out data");
+    let said = fail(
+        folder.path(),
+        "generate plan.toml --out data --progress quiet",
+    );
     contains(&said, &["room.ply", "radius"]);
 }

@@ -50,14 +50,20 @@ fn a_broken_calibration_is_reported_with_file_and_place() {
     write_plan(folder.path(), "calibration_file = \"scanner.toml\"\n");
     let scan = phantom().join("p01.nii");
     let audit = format!("xray audit {} --calibration scanner.toml", scan.display());
-    for command in [audit.as_str(), "generate plan.toml --out data"] {
+    for command in [
+        audit.as_str(),
+        "generate plan.toml --out data --progress quiet",
+    ] {
         let said = fail(folder.path(), command);
         contains(&said, &["scanner.toml", "segment \"all\"", "knot 2"]);
     }
     fs::write(&file, format!("{segment}dense = 3\n")).unwrap();
     contains(&fail(folder.path(), &audit), &["scanner.toml", "line 4"]);
     fs::remove_file(&file).unwrap();
-    let said = fail(folder.path(), "generate plan.toml --out data");
+    let said = fail(
+        folder.path(),
+        "generate plan.toml --out data --progress quiet",
+    );
     contains(&said, &["scanner.toml", "cannot be read"]);
 }
 

@@ -53,7 +53,7 @@ fn a_shift_past_the_limb_and_a_wild_tilt_are_refused() {
         ),
     ] {
         write_plan(folder, &format!("[positioning]\n{positioning}\n"));
-        let message = fail(folder, "generate plan.toml --out data");
+        let message = fail(folder, "generate plan.toml --out data --progress quiet");
         contains(&message, &[expected]);
         assert!(!folder.join("data/patient_3").exists());
     }

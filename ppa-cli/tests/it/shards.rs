@@ -334,7 +334,10 @@ fn one_scan_under_two_numbers_is_refused() {
         let again = case.replace("patient = 3", &format!("patient = {patient}"));
         let twice = text.replace("[rotation]", &format!("{again}[rotation]"));
         fs::write(folder.path().join("twice.toml"), twice).unwrap();
-        let said = fail(folder.path(), "generate twice.toml --out data");
+        let said = fail(
+            folder.path(),
+            "generate twice.toml --out data --progress quiet",
+        );
         assert!(said.contains(words), "{said}");
         assert!(!folder.path().join("data").exists());
     }
