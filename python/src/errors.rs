@@ -46,13 +46,13 @@ fn in_python(sentence: &str) -> String {
 }
 
 /// The exception of a library's error: `OSError`, or one of its kinds such as `FileNotFoundError`, where the system refused
-/// something, else [`PpaError`].
+/// something or a library did not find a file, else [`PpaError`].
 pub fn raised(error: impl Error + 'static) -> PyErr {
     let sentence = in_python(&error_chain(&error));
     let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
     while let Some(error) = cause {
         if let Some(system) = error.downcast_ref::<io::Error>()
-            && system.raw_os_error().is_some()
+            && (system.raw_os_error().is_some() || system.kind() == io::ErrorKind::NotFound)
         {
             return io::Error::new(system.kind(), sentence).into();
         }
