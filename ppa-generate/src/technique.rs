@@ -41,6 +41,14 @@ pub enum Technique {
     Elbow,
 }
 
+/// What differs between the examinations.
+struct Factors {
+    kvp: f64,
+    mas: f64,
+    /// Along the limb.
+    field_length_mm: f64,
+}
+
 /// Width and height of pixels, mm.
 const PIXEL_MM: f64 = 0.148;
 
@@ -61,9 +69,8 @@ impl Technique {
         ("elbow", Self::Elbow),
     ];
 
-    /// Tube voltage in kV, tube load in mAs and length of the field in mm.
-    fn exposure(self) -> (f64, f64, f64) {
-        match self {
+    fn factors(self) -> Factors {
+        let (kvp, mas, field_length_mm) = match self {
             Self::Ankle => (55.0, 4.0, 220.0),
             Self::Knee => (65.0, 8.5, 220.0),
             Self::LowerLeg => (55.0, 4.0, 420.0),
@@ -71,12 +78,21 @@ impl Technique {
             Self::Hand => (55.0, 3.0, 240.0),
             Self::Wrist => (55.0, 4.0, 240.0),
             Self::Elbow => (55.0, 3.5, 240.0),
+        };
+        Factors {
+            kvp,
+            mas,
+            field_length_mm,
         }
     }
 
     /// Sets tube, field, detector and tube load of the examination; materials, voxels, engine and presentation stay.
     pub fn apply(self, settings: &mut XraySettings) {
-        let (kvp, mas, length_mm) = self.exposure();
+        let Factors {
+            kvp,
+            mas,
+            field_length_mm: length_mm,
+        } = self.factors();
         let width_mm = 180.0;
         *settings = XraySettings {
             kvp,

@@ -17,7 +17,7 @@ pub struct MarkerPlace {
 }
 
 fn default_height_mm() -> f64 {
-    SideMarker::new(Side::Right, [0.0; 2]).height_mm
+    15.0
 }
 
 impl MarkerPlace {
