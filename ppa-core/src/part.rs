@@ -13,7 +13,7 @@ pub struct Part {
 
 /// Invalid text of a part.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("\"{found}\" is not a valid part of a run; expected k/n with k from 1 to n, as 2/8")]
+#[error("\"{found}\" is not a valid part of a run; expected k/n with k from 1 to n, such as 2/8")]
 pub struct PartError {
     found: String,
 }

@@ -39,7 +39,7 @@ pub enum RigidError {
         limit: f64,
     },
     /// The upper left block mirrors.
-    #[error("the 4x4 matrix mirrors (determinant −1), expected a rotation")]
+    #[error("the 4x4 matrix is a reflection (determinant −1), expected a rotation")]
     Mirror,
 }
 
