@@ -7,10 +7,12 @@ use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Vector3};
 #[non_exhaustive]
 pub enum GridError {
     /// At least one side has no voxels.
-    #[error("a volume of {} x {} x {} voxels is empty; every side needs at least one", .0[0], .0[1], .0[2])]
+    #[error("a volume of {} x {} x {} voxels is empty; expected at least one along each axis", .0[0], .0[1], .0[2])]
     Empty([usize; 3]),
     /// A block that reaches beyond the lattice.
-    #[error("a block ends before voxel {end} along {axis}, but the volume has {voxels} along it")]
+    #[error(
+        "a block ends before voxel {end} along {axis}, but the volume has only {voxels} along that axis"
+    )]
     Outside {
         /// i, j or k.
         axis: char,
@@ -20,7 +22,7 @@ pub enum GridError {
         voxels: usize,
     },
     /// More voxels than the machine can count.
-    #[error("a volume of {} x {} x {} voxels, expected at most {most} of them", .0[0], .0[1], .0[2], most = usize::MAX)]
+    #[error("a volume of {} x {} x {} voxels, expected at most {most} voxels", .0[0], .0[1], .0[2], most = usize::MAX)]
     TooMany([usize; 3]),
     /// The axes lie in a plane to rounding, or the affine or its inverse is not finite.
     #[error("the voxel-to-world affine is singular or not finite (determinant {determinant})")]

@@ -42,7 +42,9 @@ pub(crate) fn read(path: &Path, force: bool) -> Result<Scan, ReadError> {
             match header_size {
                 Some(count) => data.skip(count)?,
                 None if packed => {
-                    return Err(data.header("HeaderSize -1 with packed voxels; expected raw ones"));
+                    return Err(data.header(
+                        "HeaderSize -1 with compressed voxels; expected uncompressed ones",
+                    ));
                 }
                 None => data.skip_to_last(stored.bytes_of(size).unwrap_or(u64::MAX))?,
             }

@@ -72,7 +72,7 @@ fn read_header(file: &mut ScanFile) -> Result<NiftiHeader, ReadError> {
     let bytes = file.bytes(HEADER_BYTES)?;
     if bytes.len() < HEADER_BYTES {
         return Err(file.header(format!(
-            "{} bytes, too short for the {HEADER_BYTES} of a NIfTI-1 header",
+            "{} bytes, expected at least the {HEADER_BYTES} bytes of a NIfTI-1 header",
             bytes.len()
         )));
     }
@@ -84,7 +84,7 @@ fn read_header(file: &mut ScanFile) -> Result<NiftiHeader, ReadError> {
         .map_err(|_| file.header("no NIfTI-1 header (magic `n+1`) found"))?;
     if &header.magic != b"n+1\0" {
         return Err(file.header(
-            "a NIfTI header whose voxels lie in another file; expected both in one (magic `n+1`)",
+            "a NIfTI header whose voxels are in a separate file; expected both in one file (magic `n+1`)",
         ));
     }
     Ok(header)
@@ -121,7 +121,7 @@ fn stored(header: &NiftiHeader) -> Result<Stored, String> {
         1280 => Number::U64,
         code => {
             return Err(format!(
-                "voxels of datatype code {code}, expected integers or real numbers"
+                "voxels of datatype code {code}, expected integers or floating-point numbers"
             ));
         }
     };
@@ -144,7 +144,7 @@ fn scaling(header: &NiftiHeader) -> Result<[f64; 2], String> {
         return Ok([slope, intercept]);
     }
     Err(format!(
-        "scl_slope {slope} and scl_inter {intercept}, expected finite numbers, or a slope of 0 or NaN for none"
+        "scl_slope {slope} and scl_inter {intercept}, expected finite numbers, or a slope of 0 or NaN for no scaling"
     ))
 }
 
@@ -153,7 +153,7 @@ fn gap(header: &NiftiHeader) -> Result<u64, String> {
     let offset = header.vox_offset;
     if !(HEADER_BYTES as f32..=1e9).contains(&offset) {
         return Err(format!(
-            "voxels at byte {offset}, expected them behind the header"
+            "voxels at byte {offset}, expected them after the header"
         ));
     }
     Ok(offset as u64 - HEADER_BYTES as u64)

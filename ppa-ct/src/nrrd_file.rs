@@ -34,7 +34,7 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
     };
     for _ in 0..line_skip {
         if !data.line()?.ends_with('\n') {
-            return Err(data.header("fewer lines than `line skip` says"));
+            return Err(data.header("fewer lines than `line skip` specifies"));
         }
     }
     // Lines are skipped in the file, bytes in what it unpacks to.
@@ -45,7 +45,9 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
             data.skip_to_last(stored.bytes_of(size).unwrap_or(u64::MAX))?;
         }
         Skip::AllButVoxels => {
-            return Err(data.header("`byte skip` of -1 with packed voxels; expected raw ones"));
+            return Err(
+                data.header("`byte skip` of -1 with compressed voxels; expected uncompressed ones")
+            );
         }
     }
     let hu = data.voxels(&stored, size)?;

@@ -136,7 +136,7 @@ pub(crate) fn hu_plausibility(volume: &Volume) -> Option<Warning> {
     const NO_AIR_HU: f32 = -200.0;
     let (min, max) = volume.values().range();
     let window = if min >= 0.0 && max <= 255.0 {
-        "; this looks like a picture windowed to 8 bits"
+        "; this looks like an image windowed to 8 bits"
     } else {
         ""
     };

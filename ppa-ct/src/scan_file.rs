@@ -77,7 +77,7 @@ impl ScanFile {
         );
         if !bare || name.contains('\\') {
             return Err(self.header(
-                "the voxels are said to lie in another folder; expected a file beside the header",
+                "the header points to voxels in another folder; expected a file next to the header",
             ));
         }
         let path = self.path.with_file_name(name);
@@ -86,7 +86,7 @@ impl ScanFile {
             source,
         })? {
             return Err(self.header(
-                "the file of its voxels is a link to another folder; expected a file beside the header",
+                "its voxel file is a link to another folder; expected a file next to the header",
             ));
         }
         Self::open(&path)
@@ -207,7 +207,7 @@ impl ScanFile {
         if self.most < expected {
             return Err(if self.packed {
                 self.header(format!(
-                    "voxels of {expected} bytes, more than this file can be unpacked to"
+                    "{expected} bytes of voxels, more than this file can decompress to"
                 ))
             } else {
                 wrong(&self.path, self.most)

@@ -21,7 +21,7 @@ pub enum VolumeError {
     #[error("a spacing of {0} mm, expected a length above 0")]
     Spacing(f64),
     /// A spacing to resample to makes more voxels than can be worked with.
-    #[error("a spacing of {spacing_mm} mm makes {voxels:.1e} voxels, expected at most {most:.1e}")]
+    #[error("a spacing of {spacing_mm} mm gives {voxels:.1e} voxels, expected at most {most:.1e}")]
     TooFine {
         /// Spacing asked for, mm.
         spacing_mm: f64,
@@ -51,7 +51,7 @@ pub enum VolumeError {
         to_mm: f64,
     },
     /// More voxels than there is memory for.
-    #[error("memory does not hold {} and what is computed of them", ppa_core::text::count(*voxels, "voxel"))]
+    #[error("not enough memory for {} and the data computed from them", ppa_core::text::count(*voxels, "voxel"))]
     Memory {
         /// Voxels asked for.
         voxels: usize,

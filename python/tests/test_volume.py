@@ -102,7 +102,7 @@ def test_blocks_outside_a_volume_are_refused() -> None:
     volume = ppa.Volume(np.zeros((4, 5, 6), np.int16), np.eye(4))
     assert volume.crop((1, 1, 1), (4, 5, 6)).shape == (3, 4, 5)
     for low, high, says in [
-        ((0, 0, 0), (4, 9, 6), "ends before voxel 9 along j, but the volume has 5 along it"),
+        ((0, 0, 0), (4, 9, 6), "ends before voxel 9 along j, but the volume has only 5 along that axis"),
         ((2, 0, 0), (2, 5, 6), "0 x 5 x 6 voxels is empty"),
         ((-1, 0, 0), (2, 5, 6), "found (-1, 0, 0), expected whole numbers from 0 to 18446744073709551615"),
         ((0, 0, 2**64), (2, 5, 6), "found (0, 0, 18446744073709551616)"),

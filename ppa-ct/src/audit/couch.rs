@@ -150,7 +150,7 @@ impl Couch {
                 FindingCode::CouchMisplaced,
                 Severity::Severe,
                 format!(
-                    "{plate}, but the patient is said to lie {stated}: the volume may be flipped"
+                    "{plate}, but the header says that the patient lay {stated}: the volume may be flipped"
                 ),
             ),
             None if !self.behind => Finding::new(

@@ -39,7 +39,7 @@ pub(super) fn check(scan: &Scan, measures: &Measures) -> Vec<Finding> {
             FindingCode::Reader(WarningCode::GantryTilt),
             Severity::Caution,
             format!(
-                "the slice step leans {:.2} degrees from the slice normal (tilted gantry)",
+                "the slice step deviates by {:.2} degrees from the slice normal (tilted gantry)",
                 measures.tilt_deg
             ),
         );
@@ -78,7 +78,7 @@ pub(super) fn check(scan: &Scan, measures: &Measures) -> Vec<Finding> {
         }
     }
     if stated.lossy {
-        let text = "the pixels went through a lossy compression".to_owned();
+        let text = "the pixels have undergone lossy compression".to_owned();
         add(FindingCode::LossyPixels, Severity::Caution, text);
     }
     found

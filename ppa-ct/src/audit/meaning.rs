@@ -27,18 +27,18 @@ impl FindingCode {
             ),
             F::LossyPixels => (
                 "Block artefacts may roughen the skin by less than a voxel.",
-                "HU are changed by some tens; flat regions may show blocks.",
+                "HU values are off by a few tens; flat regions may show blocks.",
             ),
             F::ShiftedValues => (
                 "The skin threshold finds no surface, or the wrong one.",
-                "Air would be taken for tissue and everything be opaque. Correct the values first.",
+                "Air would be taken for tissue, and everything would be opaque. Correct the values first.",
             ),
             F::NoAir => (
                 "There is no skin to find: the scan lies inside the body.",
                 "The limb has no outline in the radiograph.",
             ),
             F::AirOffScale => (
-                "The skin may lie up to a voxel off, since its threshold stands between air and tissue.",
+                "The skin may be off by up to a voxel, since its threshold lies between air and tissue.",
                 "Densities are off by as much: check the calibration with `ppa xray audit`.",
             ),
             F::NoTissue => (
@@ -50,7 +50,7 @@ impl FindingCode {
                 "Soft tissue gets the density of something else: a phantom, contrast agent or a wrong rescale slope.",
             ),
             F::NoBone => (
-                "Landmarks that rest on bone cannot be found.",
+                "Landmarks that depend on bone cannot be found.",
                 "The radiograph shows no bone.",
             ),
             F::ClippedAbove => (
@@ -70,7 +70,7 @@ impl FindingCode {
                 "Implants show; their density depends on the calibration's metal segment, and streaks show as false lines.",
             ),
             F::Couch => (
-                "The couch must go: `ppa prepare` removes it; where the limb pressed on it, skin is flat.",
+                "The couch must be removed, which `ppa prepare` does; where the limb pressed on it, the skin is flat.",
                 "`ppa prepare` keeps it out of the beam; in the raw scan it would cast a shadow.",
             ),
             F::CouchMisplaced => (
@@ -78,7 +78,7 @@ impl FindingCode {
                 "As for depth images: a mirrored ankle is labelled as the other side.",
             ),
             F::CutAtSide => (
-                "The cut is a flat wall that a camera at that side sees; regions of interest there are useless.",
+                "The cut is a flat wall that a camera on that side sees; regions of interest there are useless.",
                 "Tissue beyond the cut does not attenuate: a false edge, and too bright a shadow next to it.",
             ),
             F::CutAtEnd => (
@@ -86,7 +86,7 @@ impl FindingCode {
                 "Beyond the end the detector sees open field, and scatter from there is missing.",
             ),
             F::Identifiers => (
-                "None: no value of them reaches an image.",
+                "None: these values do not reach any image.",
                 "None. The scan itself is a patient's record: do not share it.",
             ),
         }
@@ -125,8 +125,8 @@ fn of_warning(code: WarningCode) -> (&'static str, &'static str) {
             "Every density is wrong. Use the original scan.",
         ),
         WarningCode::NoOrientation => (
-            "A right limb may be taken for a left one, and turn the wrong way.",
-            "A right limb may be taken for a left one, and turn the wrong way.",
+            "A right limb may be taken for a left one and rotated the wrong way.",
+            "A right limb may be taken for a left one and rotated the wrong way.",
         ),
     }
 }

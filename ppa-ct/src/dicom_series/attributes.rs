@@ -97,7 +97,11 @@ impl<'a> Attributes<'a> {
                     true => text,
                     false => "text".to_owned(),
                 };
-                self.bad(name, found, "finite numbers of the standard's count")
+                self.bad(
+                    name,
+                    found,
+                    "as many finite numbers as the standard specifies",
+                )
             })
     }
 

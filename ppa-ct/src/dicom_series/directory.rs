@@ -78,7 +78,7 @@ fn outside(path: &Path) -> ReadError {
     ReadError::BadTag {
         path: path.to_owned(),
         tag: "ReferencedFileID",
-        found: "a place outside its folder".to_owned(),
+        found: "a path outside its folder".to_owned(),
         expected: "a file below it",
     }
 }

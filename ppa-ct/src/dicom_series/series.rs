@@ -122,10 +122,7 @@ impl Sorted {
         if self.missing > 0 {
             warnings.push(Warning {
                 code: WarningCode::FilesMissing,
-                text: format!(
-                    "the DICOMDIR names {} files that are not there",
-                    self.missing
-                ),
+                text: format!("the DICOMDIR lists {} files that are missing", self.missing),
             });
         }
         warnings

@@ -85,7 +85,7 @@ impl Stack {
             warnings.push(Warning {
                 code: WarningCode::GantryTilt,
                 text: format!(
-                    "the slice step leans {tilt_deg:.2} degrees from the slice normal (tilted gantry); \
+                    "the slice step deviates by {tilt_deg:.2} degrees from the slice normal (tilted gantry); \
                      the sheared affine is kept exactly"
                 ),
             });

@@ -46,7 +46,7 @@ impl StoredFormat {
                     "{} with {} bits stored up to bit {}",
                     format.bits_allocated, format.bits_stored, format.high_bit
                 ),
-                "8, 16 or 32 with the stored bits inside",
+                "8, 16 or 32, with the stored bits within them",
             ));
         }
         // Padding is written as a value, not as a container; files disagree on its sign.

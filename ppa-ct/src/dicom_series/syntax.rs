@@ -55,7 +55,7 @@ fn shown(uid: &str) -> &str {
     let digits = |c: char| c.is_ascii_digit() || c == '.';
     match uid.starts_with("1.2.840.10008.") && uid.len() <= 64 && uid.chars().all(digits) {
         true => uid,
-        false => "no UID of the standard",
+        false => "not a standard UID",
     }
 }
 

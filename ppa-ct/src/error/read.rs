@@ -37,7 +37,7 @@ pub enum ReadError {
         feature: &'static str,
     },
     /// A folder without a single DICOM image.
-    #[error("no DICOM image in {} ({files} files looked at, subfolders included){}", path.display(), other_format(volume.as_deref()))]
+    #[error("no DICOM image in {} ({files} files examined, including subfolders){}", path.display(), other_format(volume.as_deref()))]
     NoDicom {
         /// The folder.
         path: PathBuf,
@@ -47,7 +47,7 @@ pub enum ReadError {
         volume: Option<PathBuf>,
     },
     /// A DICOMDIR whose files are not there.
-    #[error("{} is a DICOM directory; none of the {missing} files that it names lies below it", path.display())]
+    #[error("{} is a DICOM directory, but none of the {missing} files that it lists exists below its folder", path.display())]
     EmptyDirectory {
         /// The directory.
         path: PathBuf,
@@ -55,7 +55,7 @@ pub enum ReadError {
         missing: usize,
     },
     /// A file that starts as DICOM cannot be parsed to the end.
-    #[error("{} is damaged or no valid DICOM file", path.display())]
+    #[error("{} is damaged or not a valid DICOM file", path.display())]
     Dicom {
         /// The file.
         path: PathBuf,
@@ -107,7 +107,7 @@ pub enum ReadError {
         series: Vec<SeriesSummary>,
     },
     /// The series that was chosen is not there.
-    #[error("{} does not hold the chosen series, but {}", path.display(), list_series(series))]
+    #[error("{} does not hold the chosen series; it holds {}", path.display(), list_series(series))]
     NoSuchSeries {
         /// The folder or file.
         path: PathBuf,
@@ -115,7 +115,7 @@ pub enum ReadError {
         series: Vec<SeriesSummary>,
     },
     /// Nothing but localizers (scout views).
-    #[error("{} holds {} and no slices", path.display(), count(*localizers, "localizer image"))]
+    #[error("{} holds {} but no slices", path.display(), count(*localizers, "localizer image"))]
     OnlyLocalizers {
         /// The folder.
         path: PathBuf,
@@ -123,7 +123,7 @@ pub enum ReadError {
         localizers: usize,
     },
     /// A multi-frame object that does not state where its frames lie.
-    #[error("{} holds {} and places for {described} of them", path.display(), count(*frames, "frame"))]
+    #[error("{} holds {} but positions for {described} of them", path.display(), count(*frames, "frame"))]
     MultiFrame {
         /// The file.
         path: PathBuf,
@@ -133,7 +133,7 @@ pub enum ReadError {
         described: usize,
     },
     /// No decoder for the way the pixels are packed.
-    #[error("cannot unpack the pixels of {}: transfer syntax {name} ({uid})", path.display())]
+    #[error("cannot decode the pixels of {}: transfer syntax {name} ({uid})", path.display())]
     TransferSyntax {
         /// The file.
         path: PathBuf,
@@ -145,7 +145,7 @@ pub enum ReadError {
         source: Cause,
     },
     /// The pixel data do not have the size that the header promises, or are compressed more than is plausible.
-    #[error("{} holds {found} bytes of pixels, from which its header expects {expected}", path.display())]
+    #[error("{} holds {found} bytes of pixel data, which do not match the {expected} bytes specified by its header", path.display())]
     PixelCount {
         /// The file.
         path: PathBuf,
@@ -194,7 +194,7 @@ pub enum ReadError {
         gaps: Vec<Gap>,
     },
     /// Slices that do not follow each other along one line.
-    #[error("the slices in {} do not follow one line: number {slice} lies {off_mm:.3} mm beside that from the first to the last", path.display())]
+    #[error("the slices in {} do not lie on one line: slice {slice} is {off_mm:.3} mm off the line from the first to the last", path.display())]
     Sideways {
         /// The folder.
         path: PathBuf,
@@ -204,7 +204,7 @@ pub enum ReadError {
         off_mm: f64,
     },
     /// Gaps that would take far more slices to fill than there are.
-    #[error("the gaps between the {slices} slices in {} take {needed:.0} slices to fill, expected at most {most}", path.display())]
+    #[error("filling the gaps between the {slices} slices in {} would give {needed:.0} slices, expected at most {most}", path.display())]
     TooManyGaps {
         /// The folder.
         path: PathBuf,
@@ -257,7 +257,7 @@ impl ReadError {
             Self::MultiFrame {
                 frames, described, ..
             } => format!(
-                "{} and places for {described} of them",
+                "{} but positions for {described} of them",
                 count(*frames, "frame")
             ),
             _ => "damaged".to_owned(),

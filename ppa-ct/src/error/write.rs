@@ -41,7 +41,7 @@ pub enum WriteError {
         feature: &'static str,
     },
     /// More voxels along one axis than the format can hold.
-    #[error("a volume of {} x {} x {} voxels does not fit {format}, which holds {most} along an axis", size[0], size[1], size[2])]
+    #[error("a volume of {} x {} x {} voxels does not fit in {format}, which allows at most {most} along each axis", size[0], size[1], size[2])]
     TooLarge {
         /// Voxels along i, j, k.
         size: [usize; 3],
@@ -52,7 +52,7 @@ pub enum WriteError {
     },
     /// The axes i and j are not perpendicular: no DICOM slice.
     #[error(
-        "the axes i and j lean {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot express"
+        "the axes i and j deviate by {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot represent"
     )]
     SlantedSlices {
         /// How far from perpendicular.

@@ -76,21 +76,19 @@ impl Header {
                 return Err(file.header(if line.is_empty() {
                     "the header ends without ElementDataFile".to_owned()
                 } else {
-                    format!("line {number} of the header is not a `Key = Value` of a MetaImage")
+                    format!("line {number} of the header is not a MetaImage `Key = Value` line")
                 }));
             };
             let key = key.trim().to_owned();
             let last = key == "ElementDataFile";
             if values.insert(key, value.trim().to_owned()).is_some() {
-                return Err(
-                    file.header(format!("line {number} of the header gives a key once more"))
-                );
+                return Err(file.header(format!("line {number} of the header repeats a key")));
             }
             if last {
                 return Ok(Self { values });
             }
         }
-        Err(file.header(format!("no end of the header in {MOST_LINES} lines")))
+        Err(file.header(format!("the header does not end within {MOST_LINES} lines")))
     }
 
     /// What the header holds in words of its writer's choice, by name.
@@ -180,7 +178,7 @@ impl Header {
             "MET_DOUBLE" => Number::F64,
             other => {
                 return Err(format!(
-                    "voxels of type {other}, expected integers or real numbers"
+                    "voxels of type {other}, expected integers or floating-point numbers"
                 ));
             }
         };
@@ -249,7 +247,7 @@ impl Header {
         match stated.strip_prefix("MET_MOD_") {
             Some("OTHER" | "UNKNOWN") => Ok(None),
             Some(modality @ ("CT" | "MR" | "NM" | "US")) => Ok(Some(modality)),
-            _ => Err("Modality is none of the format's".to_owned()),
+            _ => Err("Modality is not a value of the format".to_owned()),
         }
     }
 

@@ -57,8 +57,8 @@ fn write_pair(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let Some(name) = name else {
         return Err(WriteError::Name {
             path: path.to_owned(),
-            expected: "in Unicode without a leading blank, LIST at its start, %, backslashes and control characters, \
-                       which the header of a .mhd cannot hold",
+            expected: "in Unicode without a leading blank, LIST at its start, %, backslashes or control characters, \
+                       which the header of a .mhd file cannot hold",
         });
     };
     let data = path.with_file_name(&name);

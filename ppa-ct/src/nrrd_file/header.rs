@@ -86,7 +86,7 @@ impl Header {
             if line.trim_end_matches(['\r', '\n']).is_empty() {
                 let detached = header.fields.contains_key("datafile");
                 if line.is_empty() && !detached {
-                    return Err(file.header("the header has no end"));
+                    return Err(file.header("the header does not end with an empty line"));
                 }
                 return Ok(header);
             }
@@ -97,7 +97,7 @@ impl Header {
                 .take(line.trim())
                 .map_err(|problem| file.header(format!("line {number} of the header {problem}")))?;
         }
-        Err(file.header(format!("no end of the header in {MOST_LINES} lines")))
+        Err(file.header(format!("the header does not end within {MOST_LINES} lines")))
     }
 
     /// One line. Messages leave its words out: they may be about a person.
@@ -128,7 +128,7 @@ impl Header {
         };
         match self.fields.insert(name, value.trim().to_owned()) {
             None => Ok(()),
-            Some(_) => Err("gives a field once more"),
+            Some(_) => Err("repeats a field"),
         }
     }
 
@@ -159,7 +159,9 @@ impl Header {
         let kinds = self.get("kinds").unwrap_or("");
         let spatial = |kind: &str| ["domain", "space", "none", "???"].contains(&kind);
         if !kinds.to_ascii_lowercase().split_whitespace().all(spatial) {
-            return Err(format!("axes of kinds {kinds}, expected three of space"));
+            return Err(format!(
+                "axes of kinds {kinds}, expected three spatial axes"
+            ));
         }
         match (dimension, <[usize; 3]>::try_from(numbers)) {
             ("3", Ok(size)) => Ok(size),
@@ -248,7 +250,7 @@ fn number(name: &str) -> Result<Number, String> {
         "double" => Number::F64,
         _ => {
             return Err(format!(
-                "voxels of type {name}, expected integers or real numbers"
+                "voxels of type {name}, expected integers or floating-point numbers"
             ));
         }
     })

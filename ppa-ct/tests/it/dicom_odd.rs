@@ -250,7 +250,10 @@ fn slices_beside_the_line_and_endless_gaps_are_reported() {
     write_series(folder.path(), &slices);
     for options in [ReadOptions::default(), fill] {
         let error = read_with(folder.path(), &options).unwrap_err().to_string();
-        assert!(error.contains("number 3 lies 3.000 mm beside"), "{error}");
+        assert!(
+            error.contains("slice 3 is 3.000 mm off the line"),
+            "{error}"
+        );
     }
 }
 
@@ -334,7 +337,7 @@ fn what_is_no_scan_is_named() {
     std::fs::write(folder.path().join("leg.nii.gz"), "").unwrap();
     let error = read(folder.path()).unwrap_err().to_string();
     let said = format!(
-        "subfolders included); name the file {} itself",
+        "including subfolders); name the file {} itself",
         folder.path().join("leg.nii.gz").display()
     );
     assert!(error.contains(&said), "{error}");

@@ -197,7 +197,7 @@ fn what_cannot_be_read_right_is_refused_by_name() {
         ("TransformMatrix = 1 0 0 0 1 0 0 0", "9 finite numbers"),
         ("Offset = 1 2 x", "3 finite numbers"),
         ("DistanceUnits = inch", "DistanceUnits"),
-        ("Modality = John Doe", "Modality is none"),
+        ("Modality = John Doe", "Modality is not a value"),
         ("HeaderSize = x", "HeaderSize"),
         ("John Doe", "line 11 of the header"),
     ] {
@@ -210,15 +210,18 @@ fn what_cannot_be_read_right_is_refused_by_name() {
     for (name, reason) in [
         ("LIST", "LIST"),
         ("v%03d.raw 1 3 1", "numbered series"),
-        ("../v 1.raw", "beside the header"),
-        ("/etc/passwd", "beside the header"),
+        ("../v 1.raw", "next to the header"),
+        ("/etc/passwd", "next to the header"),
     ] {
         let error = beside(&[], name, &voxels()).unwrap_err().to_string();
         assert!(error.contains(reason), "{name}: {error}");
     }
     let packed = ["CompressedData = True", "HeaderSize = -1"];
     let error = beside(&packed, "v 1.raw", &deflated(&voxels())).unwrap_err();
-    assert!(error.to_string().contains("expected raw"), "{error}");
+    assert!(
+        error.to_string().contains("expected uncompressed"),
+        "{error}"
+    );
 }
 
 #[test]

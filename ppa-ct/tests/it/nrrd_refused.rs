@@ -38,14 +38,17 @@ fn what_cannot_be_read_right_is_refused_by_name() {
             "line 10 of the header is not a field",
         ),
         (vec!["byte skip: -2"], "byte skip -2"),
-        (vec!["encoding: gzip", "byte skip: -1"], "expected raw"),
+        (
+            vec!["encoding: gzip", "byte skip: -1"],
+            "expected uncompressed",
+        ),
         (vec!["data file: LIST"], "LIST"),
         (vec!["data file: v%03d.raw 1 3 1"], "numbered series"),
-        (vec!["data file: ../v.raw"], "beside the header"),
-        (vec!["data file: /etc/passwd"], "beside the header"),
-        (vec!["data file: .\\v.raw"], "beside the header"),
-        (vec!["data file: .."], "beside the header"),
-        (vec!["data file: ./v.raw"], "beside the header"),
+        (vec!["data file: ../v.raw"], "next to the header"),
+        (vec!["data file: /etc/passwd"], "next to the header"),
+        (vec!["data file: .\\v.raw"], "next to the header"),
+        (vec!["data file: .."], "next to the header"),
+        (vec!["data file: ./v.raw"], "next to the header"),
     ] {
         let error = attached(&changes, &voxels()).unwrap_err().to_string();
         assert!(error.contains(reason), "{changes:?}: {error}");
@@ -56,7 +59,12 @@ fn what_cannot_be_read_right_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("v.nrrd");
     fs::write(&path, [twice.as_bytes(), &voxels()].concat()).unwrap();
-    assert!(read(&path).unwrap_err().to_string().contains("once more"));
+    assert!(
+        read(&path)
+            .unwrap_err()
+            .to_string()
+            .contains("repeats a field")
+    );
     fs::write(&path, "NIFTI?").unwrap();
     assert!(read(&path).unwrap_err().to_string().contains("NRRD0001"));
 }
@@ -116,7 +124,7 @@ fn too_few_and_too_many_bytes_are_refused() {
     );
     let error = bomb.unwrap_err().to_string();
     assert!(
-        error.contains("more than this file can be unpacked to"),
+        error.contains("more than this file can decompress to"),
         "{error}"
     );
 }

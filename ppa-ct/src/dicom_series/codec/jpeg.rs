@@ -74,7 +74,7 @@ fn frame(packed: &[u8], image: &Image) -> Result<Frame, CodecError> {
 }
 
 fn no_frame() -> CodecError {
-    CodecError::Damaged("no frame in it".to_owned())
+    CodecError::Damaged("no frame found".to_owned())
 }
 
 fn damaged(error: JpegError) -> CodecError {

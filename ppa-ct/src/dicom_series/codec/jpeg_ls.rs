@@ -16,12 +16,12 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
     let damaged = |what: &str| CodecError::Damaged(what.to_owned());
     let mut rest = packed
         .strip_prefix(&[0xff, 0xd8])
-        .ok_or_else(|| damaged("no start of an image"))?;
+        .ok_or_else(|| damaged("no start-of-image marker"))?;
     let mut bits = None;
     let mut thresholds = None;
     loop {
         let marker = marker(&mut rest).ok_or_else(|| damaged("a marker is missing"))?;
-        let segment = segment(&mut rest).ok_or_else(|| damaged("a segment is cut"))?;
+        let segment = segment(&mut rest).ok_or_else(|| damaged("a segment is truncated"))?;
         match (marker, segment) {
             // Start of a frame (section C.2.2).
             (0xf7, [depth, y1, y0, x1, x0, components, ..]) => {
@@ -67,11 +67,11 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
                     });
                 }
                 let coding = Coding::new(bits, i32::from(*near), thresholds)
-                    .ok_or_else(|| damaged("impossible coding parameters"))?;
+                    .ok_or_else(|| damaged("invalid coding parameters"))?;
                 let room = with_room(image.pixels())?;
                 let samples = coding
                     .decode(rest, image.columns, image.rows, room)
-                    .ok_or_else(|| damaged("it ends early or holds an impossible code"))?;
+                    .ok_or_else(|| damaged("it ends early or contains an invalid code"))?;
                 return contain(samples.iter().map(|&v| v.into()), image);
             }
             (0xe0..=0xef | 0xfe | 0xdd, _) => {}

@@ -26,7 +26,7 @@ const LEVELS_AT_MOST: u8 = 16;
 /// Refuses a codestream that asks for more than its bytes and pixels warrant.
 pub(super) fn check(stream: &[u8]) -> Result<(), CodecError> {
     let segments = Segments::read(stream).ok_or_else(|| {
-        CodecError::Damaged("the headers of the codestream cannot be followed".to_owned())
+        CodecError::Damaged("the headers of the codestream cannot be parsed".to_owned())
     })?;
     let size = &segments.size;
     expect_grey(size.components)?;
@@ -35,7 +35,11 @@ pub(super) fn check(stream: &[u8]) -> Result<(), CodecError> {
     let tiles = TILES_AT_MOST.min(TILES_ALWAYS + bytes / TILE_BYTES);
     at_most("tiles:", size.tiles(), tiles)?;
     for coding in segments.codings() {
-        at_most("halvings:", coding.levels.into(), LEVELS_AT_MOST.into())?;
+        at_most(
+            "decomposition levels:",
+            coding.levels.into(),
+            LEVELS_AT_MOST.into(),
+        )?;
     }
     let most_packets = PACKETS_ALWAYS + bytes;
     let most_contributions = CONTRIBUTIONS_ALWAYS + size.pixels() / PIXELS_PER_CONTRIBUTION;
