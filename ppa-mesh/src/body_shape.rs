@@ -50,7 +50,7 @@ pub struct BumpSite {
 #[non_exhaustive]
 pub enum ShapeError {
     /// Bumps are wanted but there is nowhere to put them.
-    #[error("no site is given for bumps, of which {count} are wanted")]
+    #[error("the number of bumps is {count}, but no site is given for them")]
     NoSite {
         /// Bumps wanted.
         count: usize,
@@ -63,7 +63,7 @@ pub enum ShapeError {
     },
     /// A bump that is none.
     #[error(
-        "bump {index} is {height_mm} mm high with a sigma of {sigma_mm} mm: its place must be finite, its height \
+        "bump {index} is {height_mm} mm high with a sigma of {sigma_mm} mm: its position must be finite, its height \
          between -{MOST_MM} and {MOST_MM} mm, its sigma above 0 and at most {MOST_MM} mm"
     )]
     Size {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 #[non_exhaustive]
 pub enum CloudError {
     /// Too few points.
-    #[error("the cloud's number of points is {found}, expected at least {expected}")]
+    #[error("the number of points in the cloud is {found}, expected at least {expected}")]
     TooFewPoints {
         /// Points given.
         found: usize,
@@ -19,7 +19,7 @@ pub enum CloudError {
         expected: usize,
     },
     /// More points than the search tree can number.
-    #[error("a cloud of {found} points is too large for a search of neighbours")]
+    #[error("a cloud of {found} points is too large for a neighbour search")]
     TooManyPoints {
         /// Points given.
         found: usize,

@@ -57,7 +57,7 @@ fn a_mesh_that_is_none_is_refused() {
         ),
         (
             "depth render mesh.gltf --out d.png",
-            ["mesh.gltf", ".ply, .obj and .stl"],
+            ["mesh.gltf", ".ply, .obj or .stl"],
         ),
         (
             "scene room --out room.stl",

@@ -100,16 +100,16 @@ pub enum LimbError {
         max_hu: f32,
     },
     /// The chosen point lies outside the volume or in air.
-    #[error("the point ({}, {}, {}) mm, said to be inside the limb, is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
+    #[error("the point ({}, {}, {}) mm, given as inside the limb, is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
     Inside([f64; 3]),
     /// A point of a body that is to be kept lies outside the volume or in air.
     #[error("the point ({}, {}, {}) mm of a body to keep is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
     Kept([f64; 3]),
     /// A point of something that is no body, as it is thinner than twice [`LimbSettings::core_radius_mm`].
-    #[error("the point ({}, {}, {}) mm is in no body: sheets and other thin things cannot be kept", .0[0], .0[1], .0[2])]
+    #[error("the point ({}, {}, {}) mm is not inside a body: sheets and other thin structures cannot be kept", .0[0], .0[1], .0[2])]
     Thin([f64; 3]),
     /// The body to keep or to remove is the limb.
-    #[error("the point ({}, {}, {}) mm is in the limb itself, which stays; another body can be taken as the limb", .0[0], .0[1], .0[2])]
+    #[error("the point ({}, {}, {}) mm is in the limb itself, which is always kept; another body can be chosen as the limb", .0[0], .0[1], .0[2])]
     InLimb([f64; 3]),
     /// No surface could be made.
     #[error("the limb has no surface")]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum MeshFileError {
     /// The name does not give the format.
-    #[error("{} ends in none of .ply, .obj and .stl", path.display())]
+    #[error("{} does not end in .ply, .obj or .stl", path.display())]
     Extension {
         /// File asked for.
         path: PathBuf,
@@ -46,7 +46,7 @@ pub enum MeshFileError {
         vertex: usize,
     },
     /// A face names a vertex that does not exist.
-    #[error("face {face} of {} names vertex {found}, but there are {vertices}", path.display())]
+    #[error("face {face} of {} refers to vertex {found}, but the number of vertices is {vertices}", path.display())]
     Index {
         /// File asked for.
         path: PathBuf,

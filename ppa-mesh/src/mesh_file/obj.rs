@@ -35,10 +35,8 @@ pub fn read(bytes: &[u8]) -> Result<MeshContents, Fault> {
             Some("vn") => normals.push(Vector3::from(three(words, at)?)),
             Some("f") => {
                 for word in words {
-                    let (corner, normal) =
-                        corner(word, points.len(), normals.len()).ok_or_else(|| {
-                            broken(at, &format!("\"{word}\" is not a corner of a face"))
-                        })?;
+                    let (corner, normal) = corner(word, points.len(), normals.len())
+                        .ok_or_else(|| broken(at, &format!("\"{word}\" is not a face vertex")))?;
                     own_normals &= normal.is_none_or(|normal| normal == corner);
                     corners.push(corner);
                 }
@@ -47,7 +45,7 @@ pub fn read(bytes: &[u8]) -> Result<MeshContents, Fault> {
             _ => {}
         }
         if line.ends_with('\\') {
-            return Err(broken(at, "continued lines are not supported"));
+            return Err(broken(at, "line continuations are not supported"));
         }
     }
     let mut polygons = Polygons::between(points.len());

@@ -41,7 +41,7 @@ pub fn read(bytes: &[u8]) -> Result<MeshContents, Fault> {
     }
     Err(broken(match (count, promised) {
         (Some(count), Some(promised)) => format!(
-            "it has {} bytes where its header asks for {promised}, {count} triangles",
+            "it has {} bytes, but its header specifies {promised} bytes for {count} triangles",
             bytes.len()
         ),
         _ => {
@@ -85,7 +85,7 @@ fn text(text: &str) -> Result<MeshContents, Fault> {
                 shared.push(corners.map_err(|_| fault("expected three corners before it"))?);
             }
             "endsolid" => ended = true,
-            _ => return Err(fault("expected a word of the format")),
+            _ => return Err(fault("expected an STL keyword")),
         }
     }
     if !ended {

@@ -57,7 +57,7 @@ pub enum SurfaceError {
     #[error("the iso value {0} HU is not a finite number")]
     Iso(f32),
     /// Surfaces need neighbouring voxels on every axis.
-    #[error("a volume of {} x {} x {} voxels is too thin for a surface; every side needs at least two", .0[0], .0[1], .0[2])]
+    #[error("a volume of {} x {} x {} voxels is too thin for a surface; expected at least two along each axis", .0[0], .0[1], .0[2])]
     TooThin([usize; 3]),
     /// Vertex indices have 30 bits.
     #[error("the surface has more than 2^30 vertices")]

@@ -134,12 +134,12 @@ fn broken_files_are_refused_with_the_reason() {
         (
             "a.ply",
             PLY.replace("4 0 1 2 3", "4 0 1 2 9"),
-            "names vertex 9, but there are 4",
+            "refers to vertex 9, but the number of vertices is 4",
         ),
         (
             "a.ply",
             PLY.replace("4 0 1 2 3", "4 0 1 2 -3"),
-            "names vertex -3",
+            "refers to vertex -3",
         ),
         (
             "a.ply",
@@ -156,13 +156,13 @@ fn broken_files_are_refused_with_the_reason() {
         (
             "a.obj",
             OBJ.replace("-2/1/1", "5/1/1"),
-            "names vertex 5, but there are 4",
+            "refers to vertex 5, but the number of vertices is 4",
         ),
-        ("a.obj", OBJ.replace("-2/1/1", "0"), "names vertex 0"),
+        ("a.obj", OBJ.replace("-2/1/1", "0"), "refers to vertex 0"),
         (
             "a.obj",
             OBJ.replace("-2/1/1", "x"),
-            "line 11: \"x\" is not a corner",
+            "line 11: \"x\" is not a face vertex",
         ),
         (
             "a.obj",
