@@ -182,7 +182,7 @@ pub enum LandmarkError {
     /// Nothing was asked for and neither joint is seen.
     #[error(
         "neither an ankle (tibia and fibula that widen to a gap above the talus) nor a knee (condyles, gap and tibial \
-         plateau) found: give the joint centre with --joint, or --limb other to turn the limb about the middle of its length"
+         plateau) found: give the joint centre with --joint, or --limb other to rotate the limb about the middle of its length"
     )]
     NoJoint,
     /// The scan ends too close to a knee on both sides.
@@ -299,7 +299,7 @@ pub enum LandmarkError {
     NoSupport,
     /// The plane given by a person has the limb on its back.
     #[error(
-        "{behind_percent:.0} % of the limb lies behind the plane of the plane points, expected less than half"
+        "{behind_percent:.0} % of the limb lies behind the plane through the plane points, expected less than half"
     )]
     PlaneThroughLimb {
         /// Share of the surface behind the plane.

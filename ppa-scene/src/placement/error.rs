@@ -53,7 +53,7 @@ pub enum PlaceError {
     #[error("the anterior direction runs along the limb's axis, expected one across it")]
     Axes,
     /// The plane points make no plane under the limb.
-    #[error("the plane points make no plane under the limb, expected {0}")]
+    #[error("the plane points do not define a plane under the limb, expected {0}")]
     Plane(&'static str),
     /// The beam runs along the table or away from it.
     #[error("the central beam does not meet the table plane in front of the source")]
@@ -66,7 +66,7 @@ pub enum PlaceError {
     },
     /// No tilt lets both ends rest.
     #[error(
-        "tipping the limb by up to 60 degrees brings its ends no closer than the table: distal \
+        "tilting the limb by up to 60 degrees does not bring both its ends down to the table: distal \
          end {:.2} mm, proximal end {:.2} mm above the lowest point",
         ppa_core::text::number(*distal_mm), ppa_core::text::number(*proximal_mm)
     )]

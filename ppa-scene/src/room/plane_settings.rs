@@ -132,7 +132,7 @@ pub enum PlaneError {
     },
     /// Nothing flat, level, large and in the right place.
     #[error(
-        "no plane: of {points} points none lie in a connected flat patch of {min_area_mm2} mm² \
+        "no plane found: none of the {points} points lie in a connected flat patch of {min_area_mm2} mm² \
          or more, within {max_tilt_deg} degrees of level{}",
         if *beam { ", under the central beam" } else { "" }
     )]

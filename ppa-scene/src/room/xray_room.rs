@@ -37,7 +37,7 @@ impl XrayRoom {
             return Err(RoomError::Length {
                 name: "point_spacing_mm",
                 found: spec.point_spacing_mm,
-                expected: "points so far apart that the room has at most 20 million",
+                expected: "a spacing that gives the room at most 20 million points",
             });
         }
         Ok(Self {
