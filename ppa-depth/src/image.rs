@@ -62,14 +62,14 @@ pub enum DepthError {
     },
     /// Something else hides everything that was to be seen.
     #[error(
-        "the surface is hidden: in all of its {pixels} pixels something stands before it (check the poses)"
+        "the surface is hidden: something is in front of it in all of its {pixels} pixels (check the poses)"
     )]
     Hidden {
         /// Pixels that it would have.
         pixels: usize,
     },
     /// Two images that belong together differ in size.
-    #[error("depth images of {} x {} and {} x {} pixels do not belong together", first[0], first[1], second[0], second[1])]
+    #[error("depth images of {} x {} and {} x {} pixels differ in size", first[0], first[1], second[0], second[1])]
     SizeMismatch {
         /// Columns and rows of the first image.
         first: [u32; 2],
@@ -77,7 +77,7 @@ pub enum DepthError {
         second: [u32; 2],
     },
     /// An image is not of the size of a camera's images.
-    #[error("the depth image has {} x {} pixels, those of the camera have {} x {}", found[0], found[1], expected[0], expected[1])]
+    #[error("the depth image has {} x {} pixels, but images of the camera have {} x {}", found[0], found[1], expected[0], expected[1])]
     OtherCamera {
         /// Columns and rows of the image.
         found: [u32; 2],

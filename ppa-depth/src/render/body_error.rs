@@ -16,7 +16,7 @@ pub enum BodyError {
         found: [f32; 3],
     },
     /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} uses vertex {vertex}, but there are {vertices}")]
+    #[error("triangle {triangle} uses vertex {vertex}, but the number of vertices is {vertices}")]
     Vertex {
         /// Which triangle.
         triangle: usize,
@@ -45,7 +45,7 @@ pub enum BodyError {
         found: [f32; 3],
     },
     /// A closed mesh surrounds the camera.
-    #[error("the camera stands inside the surface, at ({}, {}, {}) mm in its frame (check the pose)", eye[0], eye[1], eye[2])]
+    #[error("the camera is inside the surface, at ({}, {}, {}) mm in its frame (check the pose)", eye[0], eye[1], eye[2])]
     CameraInside {
         /// Where, in the frame of the body, mm.
         eye: [f64; 3],

@@ -42,12 +42,12 @@ pub enum FitError {
     Pixels(usize),
     /// The noise is too small to be seen.
     #[error(
-        "the depths vary enough to be distinguished from rounding in {0} of 20 classes of signal only, expected 4: record surfaces further away"
+        "the depths vary enough to be distinguished from rounding in only {0} of 20 signal classes, expected at least 4: record surfaces further away"
     )]
     Quiet(usize),
     /// All pixels have the same signal.
     #[error(
-        "the signal varies by a factor of {0:.2} only, expected 1.2 or more: record surfaces at several distances"
+        "the signal varies by a factor of only {0:.2}, expected 1.2 or more: record surfaces at several distances"
     )]
     Signal(f64),
 }
