@@ -77,7 +77,7 @@ def test_voxels_of_a_ct_give_dose_and_error() -> None:
     ("changes", "says"),
     [
         ({"material": np.zeros((10, 10, 10), np.int64)}, "material is an array of int64"),
-        ({"material": np.ones((10, 10, 10), np.uint8)}, "names material 1, but there are 1"),
+        ({"material": np.ones((10, 10, 10), np.uint8)}, "has material index 1, but the number of materials is 1"),
         ({"material": np.zeros((10, 10, 9), np.uint8)}, "expected the same"),
         ({"density_g_cm3": np.ones((20, 10, 10), np.float32)[::2]}, "density_g_cm3 is not contiguous"),
         ({"density_g_cm3": np.full((10, 10, 10), np.nan, np.float32)}, "density of NaN"),

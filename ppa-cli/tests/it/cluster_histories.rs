@@ -162,7 +162,7 @@ fn a_scan_in_tasks_has_the_bytes_of_one_run() {
         here,
         &format!("{} --merge two/parts/1 two/parts/2", command("again")),
     );
-    assert!(said.contains("is of another simulation"), "{said}");
+    assert!(said.contains("belongs to another simulation"), "{said}");
     assert!(!here.join("again").exists());
 }
 

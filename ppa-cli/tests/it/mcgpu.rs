@@ -135,7 +135,7 @@ fn a_scan_of_another_input_is_not_resumed() {
     let refused = |arguments: &str| {
         let said = fail(here, arguments);
         assert!(
-            said.contains("image.dat.tally is of another scan"),
+            said.contains("image.dat.tally belongs to another scan"),
             "{said}"
         );
         assert!(said.contains("--replace starts over"), "{said}");
@@ -212,8 +212,8 @@ fn a_damaged_tally_of_a_scan_is_refused() {
     let mut flipped = bytes.clone();
     flipped[bytes.len() - 500] ^= 1;
     for (bytes, report) in [
-        (&bytes[..bytes.len() - 1], "cut off or appended to"),
-        (&flipped, "its checksum does not fit"),
+        (&bytes[..bytes.len() - 1], "truncated or appended to"),
+        (&flipped, "its checksum does not match"),
         (&b"my notes"[..], "is not a tally"),
     ] {
         fs::write(&path, bytes).unwrap();
@@ -243,7 +243,7 @@ fn images_of_the_fast_engine_are_kept_as_well() {
         .unwrap();
     scan.add(station, &image, None).unwrap();
     let before = contents(&images);
-    assert!(fail(here, RESUME).contains("is of another scan"));
+    assert!(fail(here, RESUME).contains("belongs to another scan"));
     succeed(here, &run);
     let after = contents(&images);
     for name in ["image.dat_0000", "image.dat_0000.raw"] {

@@ -27,7 +27,7 @@ pub enum ProjectionError {
     },
     /// The image does not fit into the memory of this machine.
     #[error(
-        "the image of {columns} x {rows} pixels takes about {needed_gib:.1} GiB while it is made, more memory than there is"
+        "the image of {columns} x {rows} pixels needs about {needed_gib:.1} GiB of memory while it is computed, more than is available"
     )]
     Memory {
         /// Pixels along device x.
@@ -57,7 +57,7 @@ pub enum ProjectionError {
     },
     /// Blades behind the detector, or so close to the spot that their penumbra fills the field.
     #[error(
-        "the collimator blades are {blades_mm} mm from the focal spot, expected {least_mm:.1} to {source_detector_mm} mm: from where their penumbra fills the field to the distance of the detector"
+        "the collimator blades are {blades_mm} mm from the focal spot, expected {least_mm:.1} mm, where their penumbra fills the field, to {source_detector_mm} mm, the distance of the detector"
     )]
     Blades {
         /// Distance from the focal spot, mm.
@@ -69,7 +69,7 @@ pub enum ProjectionError {
     },
     /// Extrafocal radiation out of proportion.
     #[error(
-        "the extrafocal radiation is {ratio} of that of the focal spot from a square of {size_mm} mm, expected above 0 to 1 from above 0 to {most_mm} mm, a tenth of the distance to the detector"
+        "the extrafocal radiation is {ratio} of that of the focal spot and comes from a square of {size_mm} mm, expected a ratio above 0 and up to 1 and a square above 0 and up to {most_mm} mm, a tenth of the distance to the detector"
     )]
     Extrafocal {
         /// Its photons over those of the focal spot.
@@ -91,11 +91,11 @@ pub enum ProjectionError {
     },
     /// Extrafocal radiation and a field with sharp edges.
     #[error(
-        "extrafocal radiation needs the distance of the collimator blades, which it passes beyond the field"
+        "extrafocal radiation requires the distance of the collimator blades, which determines how far it spreads beyond the field"
     )]
     ExtrafocalWithoutBlades,
     /// Opening angles of the fan.
-    #[error("the x-ray field opens by {} x {} degrees, expected above 0 and below 170", found_deg[0], found_deg[1])]
+    #[error("the x-ray field has opening angles of {} x {} degrees, expected above 0 and below 170", found_deg[0], found_deg[1])]
     FanAngle {
         /// Angles along device x and y, degrees.
         found_deg: [f64; 2],
@@ -111,7 +111,7 @@ pub enum ProjectionError {
     },
     /// The field or the detector reaches nearly to the horizon.
     #[error(
-        "the {what} reaches {reach_mm} mm from the foot of the source at {source_detector_mm} mm from it, expected at most ten times that distance"
+        "the {what} reaches {reach_mm} mm from the foot of the perpendicular through the source, which is {source_detector_mm} mm away, expected at most ten times that distance"
     )]
     FieldTooWide {
         /// Field or detector.
@@ -143,7 +143,7 @@ pub enum ProjectionError {
         detector_mm: [[f64; 2]; 2],
     },
     /// Direction of the anode.
-    #[error("the anode lies towards {found_deg} degrees, expected a number")]
+    #[error("the direction of the anode is {found_deg} degrees, expected a finite number")]
     Anode {
         /// What it was.
         found_deg: f64,
@@ -162,7 +162,7 @@ pub enum ProjectionError {
         message: String,
     },
     /// A pose, direction or place holds NaN or infinity.
-    #[error("the {what} is not finite, expected numbers")]
+    #[error("the {what} is not finite, expected finite numbers")]
     NotFinite {
         /// Which one.
         what: &'static str,

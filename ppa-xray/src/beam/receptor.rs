@@ -273,7 +273,7 @@ pub enum ReceptorError {
     },
     /// A table of an MTF or a noise transfer without pairs.
     #[error(
-        "the numbers of frequencies and values of the {curve} table are {frequencies} and {values}, expected the same, at least 1"
+        "the numbers of frequencies and values of the {curve} table are {frequencies} and {values}, expected equal numbers of at least 1"
     )]
     MtfTable {
         /// MTF or noise transfer.

@@ -22,7 +22,7 @@ pub enum SpectrumError {
         weights: usize,
     },
     /// The tube voltage is outside the tube model.
-    #[error("tube voltage {found} kV is outside the tube model, which goes from {min} to {max} kV")]
+    #[error("tube voltage {found} kV is outside the tube model, which covers {min} to {max} kV")]
     TubeVoltage {
         /// Voltage asked for, kV.
         found: f64,
@@ -32,7 +32,7 @@ pub enum SpectrumError {
         max: f64,
     },
     /// The anode angle is outside the tube model.
-    #[error("anode angle {found}° is outside the tube model, which goes from {min}° to {max}°")]
+    #[error("anode angle {found}° is outside the tube model, which covers {min}° to {max}°")]
     AnodeAngle {
         /// Angle asked for, degrees.
         found: f64,
@@ -78,7 +78,7 @@ pub enum SpectrumError {
     },
     /// Photons at energies without cross sections.
     #[error(
-        "the spectrum has photons between {low_kev} and {high_kev} keV, expected them from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV"
+        "the spectrum has photons between {low_kev} and {high_kev} keV, expected photons from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV only"
     )]
     Range {
         /// Lower edge of the lowest filled bin, keV.

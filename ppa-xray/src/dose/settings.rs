@@ -35,7 +35,7 @@ pub struct VoxelBox {
 pub enum DoseError {
     /// A box is empty or leaves the phantom.
     #[error(
-        "the dose region of voxels ({}, {}, {}) to ({}, {}, {}), exclusive, is empty or leaves the phantom of {} x {} x {} voxels",
+        "the dose region of voxels ({}, {}, {}) to ({}, {}, {}), exclusive, is empty or extends beyond the phantom of {} x {} x {} voxels",
         low[0], low[1], low[2], high[0], high[1], high[2], size[0], size[1], size[2]
     )]
     Box {
@@ -47,7 +47,9 @@ pub enum DoseError {
         size: [usize; 3],
     },
     /// Not as many labels as voxels.
-    #[error("the dose is asked for by {found} labels, expected one for each of {expected} voxels")]
+    #[error(
+        "the dose is requested with {found} labels, expected one for each of {expected} voxels"
+    )]
     Labels {
         /// Number of labels.
         found: usize,

@@ -68,7 +68,7 @@ impl PreparedPhantom<'_> {
                 let per_mas = projection.photons_per_mas(spectrum)?;
                 Ok(mas
                     * per_mas.ok_or(TransportError::TubeLoad {
-                        why: "the spectrum does not say how many photons a mAs has",
+                        why: "the spectrum does not specify the number of photons per mAs",
                     })?)
             }
             TubeLoad::ExposureIndex(index) => {

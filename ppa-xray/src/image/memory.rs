@@ -30,7 +30,7 @@ mod tests {
         let huge = Detector::centred(u32::MAX, u32::MAX, 1e-6);
         let refused = check(&huge).unwrap_err().to_string();
         assert!(
-            refused.starts_with("the image of 4294967295 x 4294967295 pixels takes about"),
+            refused.starts_with("the image of 4294967295 x 4294967295 pixels needs about"),
             "{refused}"
         );
         assert_eq!(check(&Detector::centred(100, 100, 1.0)), Ok(()));

@@ -20,7 +20,7 @@ pub enum PresentationError {
         expected: &'static str,
     },
     /// No protocol has that name.
-    #[error("no presentation is named {found:?}; known are {}", known.join(", "))]
+    #[error("no presentation is named {found:?}; known presentations are {}", known.join(", "))]
     Protocol {
         /// The name given.
         found: String,

@@ -29,7 +29,7 @@ pub enum MaterialError {
         z: u8,
     },
     /// The same element twice.
-    #[error("material {name:?} names {symbol} twice")]
+    #[error("material {name:?} lists {symbol} twice")]
     Duplicate {
         /// Material at fault.
         name: String,
@@ -55,7 +55,7 @@ pub enum MaterialError {
         found: f64,
     },
     /// A name that is not in the library.
-    #[error("no material is named {name:?}; known are {} and the symbols of the elements H to U", known.join(", "))]
+    #[error("no material is named {name:?}; known materials are {} and the symbols of the elements H to U", known.join(", "))]
     Unknown {
         /// Name given.
         name: String,
@@ -69,7 +69,7 @@ pub enum MaterialError {
         found: String,
     },
     /// An energy outside the tables.
-    #[error("{found_kev} keV is outside the tables, which go from {low_kev} to {high_kev} keV")]
+    #[error("{found_kev} keV is outside the tables, which cover {low_kev} to {high_kev} keV")]
     Energy {
         /// Energy asked for, keV.
         found_kev: f64,
@@ -79,7 +79,7 @@ pub enum MaterialError {
         high_kev: f64,
     },
     /// A mixture with a material of unknown elements.
-    #[error("material {name:?} is made from tables, a mixture needs its elements")]
+    #[error("material {name:?} is defined by tables, but a mixture needs its elements")]
     NoComposition {
         /// Material at fault.
         name: String,
@@ -114,7 +114,7 @@ pub enum MaterialError {
     },
     /// Values that do not ascend.
     #[error(
-        "material {name:?}: number {index} of the {what}, counted from 0, is {found} after {before}, expected more"
+        "material {name:?}: number {index} of the {what}, counted from 0, is {found} after {before}, expected a larger number"
     )]
     TableOrder {
         /// Material at fault.

@@ -27,7 +27,7 @@ pub enum ScanDoseError {
     },
     /// Materials of another phantom.
     #[error(
-        "the dose is of the materials {found}, but the voxels of the simulation have {expected}"
+        "the dose is for the materials {found}, but the voxels of the simulation have {expected}"
     )]
     Materials {
         /// Names of the dose's materials.
@@ -37,7 +37,7 @@ pub enum ScanDoseError {
     },
     /// Doses of other voxels than the input file asks for.
     #[error(
-        "the dose is of {}, but the input file asks for {}",
+        "the dose is for {}, but the input file requests {}",
         described(found),
         described(expected)
     )]

@@ -59,7 +59,7 @@ pub enum McgpuError {
     },
     /// A section of another version of MC-GPU.
     #[error(
-        "{}, line {line}: section {section} of another version ({found:?}), expected {expected} as in MC-GPU v1.3",
+        "{}, line {line}: section {section} is from another version ({found:?}), expected {expected} as in MC-GPU v1.3",
         path.display()
     )]
     Version {
@@ -76,7 +76,7 @@ pub enum McgpuError {
     },
     /// The header promises more voxels than the file can hold.
     #[error(
-        "{}: the header names {} x {} x {} voxels, but {bytes} bytes hold {most} at most",
+        "{}: the header specifies {} x {} x {} voxels, but {bytes} bytes hold at most {most}",
         path.display(), size[0], size[1], size[2]
     )]
     VoxelsMissing {
@@ -105,7 +105,7 @@ pub enum McgpuError {
         available_mb: u64,
     },
     /// A voxel names a material that the input file does not list.
-    #[error("{} names material {found}, but {} lists {listed}", path.display(), input.display())]
+    #[error("{} uses material {found}, but {} lists only {listed}", path.display(), input.display())]
     MaterialNumber {
         /// The voxel file.
         path: PathBuf,
@@ -131,7 +131,7 @@ pub enum McgpuError {
     },
     /// Photons at energies that the tables of a material do not cover.
     #[error(
-        "the spectrum {} reaches from {low_kev} to {high_kev} keV, but {} only covers {table_low_kev} to {table_high_kev} keV",
+        "the spectrum {} extends from {low_kev} to {high_kev} keV, but {} only covers {table_low_kev} to {table_high_kev} keV",
         spectrum.display(), material.display()
     )]
     Energies {

@@ -119,7 +119,7 @@ impl<'a> Scan<'a> {
         if scan.dose.is_some() {
             scan.dose = ScanDose::from_bytes(simulation, dose);
             if scan.dose.is_none() {
-                let what = "its doses are of another size".to_owned();
+                let what = "its doses have the wrong size".to_owned();
                 return Err(TallyError::Damaged { path, what }.into());
             }
         }

@@ -17,7 +17,7 @@ pub enum ScanError {
     Tally(#[from] TallyError),
     /// The tally file was written for another scan.
     #[error(
-        "{} is of another scan: the input file, a file that it names, the seed, the number of histories, the engine or the version of ppa differ",
+        "{} belongs to another scan: the input file, a file that it names, the seed, the number of histories, the engine or the version of ppa differ",
         path.display()
     )]
     OtherScan {

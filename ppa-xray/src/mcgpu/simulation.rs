@@ -206,7 +206,7 @@ fn check_files(input: &Input) -> Result<(), McgpuError> {
     ];
     for (index, material) in input.materials.iter().enumerate() {
         if let MaterialSource::File(path) = &material.source {
-            let hint = "; ppa:NAME takes a material of the built-in library instead";
+            let hint = "; use ppa:NAME for a material of the built-in library";
             files.push((
                 format!("material file {}", index + 1),
                 material.line,

@@ -29,7 +29,7 @@ pub enum PhantomError {
     #[error("{0} materials; a phantom holds 1 to 256")]
     MaterialCount(usize),
     /// A voxel names a material that does not exist.
-    #[error("voxel ({}, {}, {}) names material {found}, but there are {materials}", voxel[0], voxel[1], voxel[2])]
+    #[error("voxel ({}, {}, {}) has material index {found}, but the number of materials is {materials}", voxel[0], voxel[1], voxel[2])]
     MaterialIndex {
         /// The voxel (i, j, k).
         voxel: [usize; 3],
@@ -47,7 +47,7 @@ pub enum PhantomError {
         found: f32,
     },
     /// A mask without a voxel.
-    #[error("the mask holds none of the scan's voxels")]
+    #[error("the mask contains none of the scan's voxels")]
     EmptyMask,
     /// The HU calibration makes no sense.
     #[error(transparent)]

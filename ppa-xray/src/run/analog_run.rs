@@ -41,7 +41,7 @@ const LEAST_BATCH: u64 = 1_024;
 pub enum RunError {
     /// Phantom, spectrum, exposure, models, doses or seed differ.
     #[error(
-        "the tally is of another simulation: phantom, spectrum, exposure, models, doses or seed differ (key {found}, expected {expected})"
+        "the tally belongs to another simulation: phantom, spectrum, exposure, models, doses or seed differ (key {found}, expected {expected})"
     )]
     OtherTally {
         /// Key of the tally.

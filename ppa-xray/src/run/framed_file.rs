@@ -127,7 +127,7 @@ impl Frame {
             .chain_update(&sums)
             .finalize();
         if digest[..] != hash[..] {
-            return Err(damaged("its checksum does not fit"));
+            return Err(damaged("its checksum does not match"));
         }
         Ok((header, sums))
     }
@@ -183,7 +183,7 @@ impl Frame {
             .map_err(|error| damaged(&error.to_string()))?;
         let expected = sums_len(&header)
             .and_then(|sums| sums.checked_add(before_sums + HASH_LEN as u64))
-            .ok_or_else(|| damaged("its header announces sums of a size that makes no sense"))?;
+            .ok_or_else(|| damaged("its header specifies sums of an impossible size"))?;
         if found != expected {
             return Err(size(expected));
         }

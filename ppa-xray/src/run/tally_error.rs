@@ -40,7 +40,7 @@ pub enum TallyError {
         expected: u32,
     },
     /// The file ends early or continues.
-    #[error("{} is {found} bytes long, expected {expected}: it was cut off or appended to", path.display())]
+    #[error("{} is {found} bytes long, expected {expected}: it was truncated or appended to", path.display())]
     Size {
         /// The file.
         path: PathBuf,
@@ -59,7 +59,7 @@ pub enum TallyError {
     },
     /// Phantom, spectrum, exposure, models, seed or code differ.
     #[error(
-        "{} is of another simulation: phantom, spectrum, exposure, models, doses, seed or version differ (key {found}, expected {expected})",
+        "{} belongs to another simulation: phantom, spectrum, exposure, models, doses, seed or version differ (key {found}, expected {expected})",
         path.display()
     )]
     Key {
@@ -95,7 +95,7 @@ pub enum TallyError {
     },
     /// A part is another one than asked for.
     #[error(
-        "{} is the part of the histories {} to {} of its run, expected {} to {}",
+        "{} is for the histories {} to {} of its run, expected {} to {}",
         path.display(), found.start, found.end, expected.start, expected.end
     )]
     Part {

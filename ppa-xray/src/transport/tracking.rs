@@ -25,7 +25,7 @@ pub enum TransportError {
     Projection(#[from] ProjectionError),
     /// The spectrum reaches outside the range of the transport.
     #[error(
-        "{percent:.3} % of the spectrum lies outside {CUTOFF_KEV} to {MAX_ENERGY_KEV} keV, where photons are followed"
+        "{percent:.3} % of the spectrum lies outside {CUTOFF_KEV} to {MAX_ENERGY_KEV} keV, the range in which photons are tracked"
     )]
     Spectrum {
         /// Share of the photons outside the range.
@@ -33,7 +33,7 @@ pub enum TransportError {
     },
     /// A material has no data where the spectrum has photons.
     #[error(
-        "{percent:.3} % of the spectrum lies outside {low_kev} to {high_kev} keV, where material {material:?} has data"
+        "{percent:.3} % of the spectrum lies outside {low_kev} to {high_kev} keV, the range of the data of material {material:?}"
     )]
     MaterialRange {
         /// The material.
@@ -47,7 +47,7 @@ pub enum TransportError {
     },
     /// The phantom was prepared for another Compton model.
     #[error(
-        "the phantom was prepared for the Compton model {prepared:?}, the settings name {found:?}"
+        "the phantom was prepared for the Compton model {prepared:?}, but the settings specify {found:?}"
     )]
     ComptonModel {
         /// Model in the settings.
@@ -56,7 +56,7 @@ pub enum TransportError {
         prepared: ComptonModel,
     },
     /// A tube load cannot be turned into histories.
-    #[error("no number of histories for the tube load: {why}")]
+    #[error("cannot derive the number of histories from the tube load: {why}")]
     TubeLoad {
         /// What is missing.
         why: &'static str,

@@ -286,9 +286,9 @@ fn what_an_input_file_names_must_fit() {
         ),
         (
             list("ppa:water\nnowhere.mcgpu.gz # x\nppa:air"),
-            "nowhere.mcgpu.gz is not a file; ppa:NAME",
+            "nowhere.mcgpu.gz is not a file; use ppa:NAME",
         ),
-        (list("ppa:water\nppa:air"), "box.vox names material 3, but "),
+        (list("ppa:water\nppa:air"), "box.vox uses material 3, but "),
         (list("ppa:water\nppa:air\nppa:cheese"), "line 35"),
         (
             list("ppa:water\nppa:air\nbeam.spc"),

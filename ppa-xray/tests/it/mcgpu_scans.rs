@@ -126,7 +126,10 @@ fn interrupted_parts_merge_to_the_projection_of_one_run() {
         })
     };
     let refused = follow(false).unwrap_err().to_string();
-    assert!(refused.contains("is of another simulation"), "{refused}");
+    assert!(
+        refused.contains("belongs to another simulation"),
+        "{refused}"
+    );
     assert!(follow(true).unwrap());
 }
 

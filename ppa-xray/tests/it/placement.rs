@@ -73,13 +73,13 @@ fn impossible_sources_and_receptors_are_named() {
             Collimation::Fan {
                 angles_deg: [0.0, 5.0],
             },
-            "opens by",
+            "opening angles",
         ),
         (
             Collimation::Fan {
                 angles_deg: [5.0, 180.0],
             },
-            "opens by",
+            "opening angles",
         ),
     ] {
         let error = refused(|p| p.source.collimation = collimation).to_string();
