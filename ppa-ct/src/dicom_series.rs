@@ -209,7 +209,7 @@ fn padding_warning(padded: usize, pixels: usize) -> Option<Warning> {
     (padded > 0).then(|| Warning {
         code: WarningCode::PixelPadding,
         text: format!(
-            "padding without a measurement in {} ({:.1} %), taken as air, -1000 HU",
+            "padding instead of measured values in {} ({:.1} %), read as air, -1000 HU",
             count(padded, "pixel"),
             100.0 * padded as f64 / pixels as f64
         ),
