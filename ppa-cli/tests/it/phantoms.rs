@@ -92,7 +92,7 @@ fn a_knee_can_be_prepared() {
         "prepare knee.nii --side l --limb lower-leg --out leg.toml",
     );
     assert!(
-        said.contains("no ankle found, but a knee around 95, 1"),
+        said.contains("no ankle found, but the knee is near 95, 1"),
         "{said}"
     );
     assert!(said.contains("--limb knee"), "{said}");

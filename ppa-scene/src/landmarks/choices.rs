@@ -168,7 +168,7 @@ pub enum LandmarkError {
     NoKnee,
     /// One joint was asked for, the limb shows the other one.
     #[error(
-        "no {asked} found, but a {found} around {:.0}, {:.0}, {:.0} mm (LPS): give --limb {}, or the centre of the \
+        "no {asked} found, but the {found} is near {:.0}, {:.0}, {:.0} mm (LPS): give --limb {}, or the centre of the \
          {asked} with --joint", at_mm[0], at_mm[1], at_mm[2], limb_of(*found)
     )]
     OtherJoint {
@@ -265,7 +265,7 @@ pub enum LandmarkError {
         least_deg: f64,
     },
     /// The axis is given by two points and by regions.
-    #[error("axis and {other} are both given, expected one of them")]
+    #[error("axis and {other} are both given, expected only one of them")]
     AxisTwice {
         /// Field of [`LandmarkOverrides`].
         other: &'static str,

@@ -250,7 +250,7 @@ fn a_knee_is_refused_where_an_ankle_was_asked_for() {
     );
     let text = error.to_string();
     assert!(
-        text.contains("no ankle found, but a knee around -95, 1"),
+        text.contains("no ankle found, but the knee is near -95, 1"),
         "{text}"
     );
     assert!(text.contains("(LPS): give --limb knee"), "{text}");
