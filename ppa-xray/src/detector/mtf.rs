@@ -211,7 +211,7 @@ pub(crate) fn table(
             require("MTF or noise transfer at 0/mm", value, 1.0..=1.0, "1")?;
             continue;
         }
-        let above = "above the frequency before it";
+        let above = "a number above the previous frequency";
         require(
             "a frequency of the MTF table in 1/mm",
             f,
