@@ -213,7 +213,7 @@ pub(crate) fn table(
         }
         let above = "a number above the previous frequency";
         require(
-            "a frequency of the MTF table in 1/mm",
+            "a frequency of the MTF or noise transfer table in 1/mm",
             f,
             last.next_up()..=f64::MAX,
             above,
