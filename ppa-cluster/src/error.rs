@@ -26,13 +26,13 @@ pub enum FolderError {
         parent: PathBuf,
     },
     /// It holds something else.
-    #[error("{} is neither empty nor a folder that ppa submit began; choose another folder", .0.display())]
+    #[error("{} is neither empty nor a folder of an earlier ppa submit; choose another folder", .0.display())]
     Occupied(PathBuf),
     /// No jobs were submitted from here.
-    #[error("{} holds no slurm/submission.json: nothing was submitted from it", .0.display())]
+    #[error("{} contains no slurm/submission.json: nothing was submitted from it", .0.display())]
     NotSubmitted(PathBuf),
     /// The list of what was submitted is damaged or of another version.
-    #[error("{} is damaged or of another version of ppa: {found}", path.display())]
+    #[error("{} is damaged or was written by another version of ppa: {found}", path.display())]
     Submission {
         /// The file.
         path: PathBuf,
@@ -40,7 +40,7 @@ pub enum FolderError {
         found: String,
     },
     /// Another `ppa submit` works on the folder.
-    #[error("{} is in use by another ppa submit; wait for its end", .0.display())]
+    #[error("{} is in use by another ppa submit; wait until it ends", .0.display())]
     Busy(PathBuf),
     /// The path cannot be used in a job script.
     #[error("{} is not valid UTF-8, which a job script needs", .0.display())]
@@ -67,7 +67,7 @@ impl FolderError {
 pub enum SlurmError {
     /// A program of Slurm is not installed.
     #[error(
-        "Slurm is not on this machine: there is no program {program} in PATH; submit from a machine of the cluster, or \
+        "Slurm is not installed on this machine: {program} was not found in PATH; submit from a machine of the cluster, or \
          write the scripts with --dry-run"
     )]
     NotInstalled {
@@ -101,13 +101,13 @@ pub enum SlurmError {
         expected: &'static str,
     },
     /// The configuration does not state the size of arrays.
-    #[error("scontrol show config states no MaxArraySize as a whole number, but {found}")]
+    #[error("scontrol show config does not report MaxArraySize as a whole number: found {found}")]
     NoArraySize {
         /// Its value, or that the line is missing.
         found: String,
     },
     /// The cluster takes no arrays.
-    #[error("the cluster takes no job arrays: its MaxArraySize is {found}, expected 2 or more")]
+    #[error("the cluster accepts no job arrays: its MaxArraySize is {found}, expected 2 or more")]
     NoArrays {
         /// MaxArraySize.
         found: u64,

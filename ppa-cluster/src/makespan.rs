@@ -26,7 +26,7 @@ pub struct ClusterSize {
 /// Text that is not the size of a cluster.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "\"{found}\" is not the size of a cluster: {why}; expected nodes=N,cores=N and perhaps cpus=N and time=H:MM:SS"
+    "invalid cluster size \"{found}\": {why}; expected nodes=N,cores=N and optionally cpus=N and time=H:MM:SS"
 )]
 pub struct ClusterSizeError {
     found: String,

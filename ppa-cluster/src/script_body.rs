@@ -73,7 +73,7 @@ pub(crate) fn of_poses(work: &PoseWork, cpus: u32) -> (ScriptBody, ScriptBody) {
              }}\n\
              {FIND_MISSING}\
              if [ ${{#missing[@]}} -gt 0 ]; then\n    \
-             echo \"no dataset: these shards were never begun: ${{missing[*]}}\"\n    \
+             echo \"no dataset: these shards were never started: ${{missing[*]}}\"\n    \
              exit 1\n\
              fi\n\
              run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset{ending}{read_back} --progress plain\n\

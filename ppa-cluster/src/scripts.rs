@@ -191,7 +191,7 @@ queue_again() {
     elif [ "${SLURM_RESTART_COUNT:-0}" -ge 20 ]; then
         echo "stopped before the time limit for the 21st time: give more --time to ppa submit"
     else
-        echo "stopped before the time limit; the job is queued again and goes on where it stopped"
+        echo "stopped before the time limit; the job is queued again and continues where it stopped"
         trap '' TERM
         scontrol requeue "$task"
     fi

@@ -121,7 +121,10 @@ mod tests {
     #[test]
     fn a_missing_program_is_no_slurm() {
         let said = output("no-such-program-of-slurm", &[]).unwrap_err();
-        assert!(said.to_string().contains("not on this machine"), "{said}");
+        assert!(
+            said.to_string().contains("not installed on this machine"),
+            "{said}"
+        );
     }
 
     #[cfg(unix)]

@@ -15,7 +15,7 @@ pub struct TimeLimit {
 /// Text that is not a time limit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "\"{found}\" is not a time limit; expected minutes, hours:minutes:seconds or days-hours:minutes:seconds, as 90 or 1:30:00"
+    "\"{found}\" is not a time limit; expected minutes, hours:minutes:seconds or days-hours:minutes:seconds, such as 90 or 1:30:00"
 )]
 pub struct TimeLimitError {
     found: String,

@@ -134,7 +134,10 @@ fn what_cannot_work_is_refused_before_anything_is_queued() {
     assert!(calls(here).is_empty());
     fs::remove_file(here.join("bin/scontrol")).unwrap();
     let said = fail(here, "submit slurm plan.toml --out other");
-    contains(&said, &["Slurm is not on this machine", "--dry-run"]);
+    contains(
+        &said,
+        &["Slurm is not installed on this machine", "--dry-run"],
+    );
     assert!(!here.join("other").exists());
 }
 
