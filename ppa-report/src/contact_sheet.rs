@@ -35,7 +35,7 @@ pub enum ContactSheetError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// The dataset shows no poses of this limb.
-    #[error("{} holds no depth images of {limb}", root.display())]
+    #[error("{} contains no depth images of {limb}", root.display())]
     Empty {
         /// The dataset.
         root: PathBuf,

@@ -243,7 +243,7 @@ fn the_page_of_a_dataset_stands_by_itself() {
         assert!(page.contains(&format!("<tr><th>{row}</th>")), "{row}");
     }
     assert!(page.contains("aria-label=\"colours of depths from "));
-    assert!(page.contains("Fewer than 9 poses") && page.contains("is as in manifest.jsonl"));
+    assert!(page.contains("Fewer than 9 poses") && page.contains("matches manifest.jsonl"));
     // What is damaged is reported, and where it would stand is a cross: there is a page when one is needed.
     let images = [
         "patient_3/depth/r/orig/depth_cam_left_0.0.png",

@@ -215,7 +215,7 @@ impl Chart {
                 "values are"
             };
             let note = format!(
-                "{beyond} {values} beyond the axes: dots stand at the rim, lines are cut there"
+                "{beyond} {values} beyond the axes: points are drawn at the edge, lines are clipped"
             );
             let [width, height] = self.size.map(|side| side as i32);
             page.draw_text(

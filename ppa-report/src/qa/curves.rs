@@ -136,7 +136,7 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
             sentences.extend(odd.iter().map(|&at| {
                 let angle = angle_text(rows[at].step);
                 format!(
-                    "{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it",
+                    "{}, {angle} degrees: {what} {:.2} {unit} does not fit the neighbouring poses",
                     shape.name(),
                     number(points[at][1])
                 )
@@ -169,7 +169,7 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
         } @else if too_few {
             p { "Fewer than " (LEAST_POSES) " poses: too few to find outliers." }
         } @else {
-            p { "No pose stands out from those beside it." }
+            p { "No pose stands out from its neighbours." }
         }
     };
     Sweeps {

@@ -106,7 +106,7 @@ pub(super) fn limb_part(
         (sweeps.html)
         h3 { "Regions of interest and the joint in whole images" }
         div class="views" { @for view in whole_views { (view) } }
-        (figure("Depth in the images above; what is nearer or farther has the colour of the end.", scale))
+        (figure("Depth in the images above; nearer and farther depths have the colours at the ends of the scale.", scale))
     };
     Ok(LimbPart {
         html,

@@ -87,7 +87,7 @@ fn checks(root: &Path, flaws: &[Flaw]) -> Markup {
     const SHOWN: usize = 50;
     html! {
         @if flaws.is_empty() {
-            p { "Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image." }
+            p { "Every image could be decoded and matches manifest.jsonl; no region reaches beyond its image." }
         } @else {
             div class="bad" {
                 p {
@@ -143,7 +143,7 @@ fn provenance(scene: &Scene) -> Markup {
         h2 { "Origin" }
         p {
             "Made by " (scene.generator) " from sources " code { (scene.code) } " with seed " (scene.seed)
-            ". All settings stand in dataset.json, pose and hash of every image in manifest.jsonl."
+            ". All settings are in dataset.json, the pose and hash of every image in manifest.jsonl."
         }
         table {
             tr { th { "limb" } th { "SHA-256 of the scan's voxels" } }

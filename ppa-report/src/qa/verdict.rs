@@ -43,10 +43,10 @@ impl Tally {
                 "bad",
                 format!("Do not use this dataset as it is: {bad}. Also: {doubts}."),
             ),
-            (true, false) => ("caution", format!("Look at this before use: {doubts}.")),
+            (true, false) => ("caution", format!("Check before use: {doubts}.")),
             (true, true) => (
                 "good",
-                "No severe or cautioning finding, no flaw of files, no outlier among the poses."
+                "No severe or cautionary findings, no flaws of files, no outliers among the poses."
                     .to_owned(),
             ),
         };
