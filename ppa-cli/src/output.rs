@@ -68,7 +68,7 @@ pub fn bytes(bytes: u64) -> String {
 
 /// Bytes from `800`, `1.5MB`, `20 GB`, `2TB`; units are powers of 1000.
 pub fn parse_bytes(text: &str) -> Result<u64, String> {
-    let wrong = || format!("{text:?} is not a size; write a number with kB, MB, GB or TB");
+    let wrong = || format!("invalid size {text:?}; expected a number with kB, MB, GB or TB");
     let text = text.trim();
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
@@ -127,7 +127,7 @@ mod tests {
             "", "GB", "-1MB", "nan", "inf GB", "0", "5 XB", "1e9TB", "5 Ω",
         ] {
             assert!(
-                parse_bytes(bad).unwrap_err().contains("not a size"),
+                parse_bytes(bad).unwrap_err().contains("invalid size"),
                 "{bad}"
             );
         }

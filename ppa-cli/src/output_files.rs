@@ -153,7 +153,9 @@ impl OutputFiles {
         }
         let path = resolved(path)?;
         match self.declared.insert(path, option.to_owned()) {
-            Some(other) => bail!("{other} and {option} name one file: expected two files"),
+            Some(other) => {
+                bail!("{other} and {option} name the same file: expected two different files")
+            }
             None => Ok(()),
         }
     }
@@ -179,7 +181,7 @@ pub fn require_same(path: &Path, bytes: &[u8], replace: ReplaceArgs) -> anyhow::
 pub fn require_room(folder: &Path, needed: u64) -> anyhow::Result<()> {
     match free_bytes(folder) {
         Some(free) if free < needed => bail!(
-            "{} would take {}, where {} are free",
+            "{} would take up {}, but only {} are free",
             folder.display(),
             in_words(needed),
             in_words(free)
@@ -331,7 +333,7 @@ mod tests {
         let again = folder.path().join("sub/../x.png");
         let refused = said(declared.file("--preview", &again, &[]));
         assert!(
-            refused.contains("--out and --preview name one file"),
+            refused.contains("--out and --preview name the same file"),
             "{refused}"
         );
     }

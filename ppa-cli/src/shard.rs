@@ -42,7 +42,7 @@ impl ShardRequest {
                     bail!("{named}, which is not shard {part} that the folder holds; give --shard")
                 }
                 _ => bail!(
-                    "{named}, which leaves its shard open; give --shard, or run the whole array from 0 or 1 on"
+                    "{named}, which does not determine the shard; give --shard, or run the whole array from 0 or 1 on"
                 ),
             },
         }
@@ -225,7 +225,10 @@ mod tests {
         ] {
             for held in [None, Some("1/1")] {
                 let refused = named_in(held, None, variables).unwrap_err();
-                assert!(refused.contains("open; give --shard"), "{refused}");
+                assert!(
+                    refused.contains("does not determine the shard; give --shard"),
+                    "{refused}"
+                );
             }
         }
         // Arrays that count from 1, and from 0.

@@ -93,10 +93,10 @@ fn describe(calibration: &Calibration) -> String {
     }
     lines.push(match coverage_of_left_out_persons {
         Some(share) => format!(
-            "Each person's labels in intervals of the other persons: {}",
+            "Each person's labels in intervals calibrated on the other persons: {}",
             percent(*share)
         ),
-        None => "Too few persons to try the intervals on those left out.".to_owned(),
+        None => "Too few persons to test the intervals on persons left out.".to_owned(),
     });
     lines.join("\n")
 }

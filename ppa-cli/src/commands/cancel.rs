@@ -34,9 +34,9 @@ pub fn run(args: &CancelArgs, output: Output) -> anyhow::Result<()> {
         cancelled: ids.into_iter().map(str::to_owned).collect(),
     };
     output.print(&cancelled, |done| match done.cancelled.as_slice() {
-        [] => format!("{}: no job waits or runs", args.jobs.display()),
+        [] => format!("{}: no pending or running jobs", args.jobs.display()),
         ids => format!(
-            "{}: cancelled {}: {}; poses that are made stay",
+            "{}: cancelled {}: {}; finished poses are kept",
             args.jobs.display(),
             count(ids.len(), "job"),
             ids.join(", ")

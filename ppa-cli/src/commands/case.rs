@@ -72,7 +72,7 @@ fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     output.print(&checked, describe)?;
     if !open.is_empty() {
         bail!(
-            "{} has {}: change the case or, after a look at it, name the code in `acknowledged`",
+            "{} has {}: change the case or, after a review, list the code in `acknowledged`",
             args.case.display(),
             count(open.len(), "severe finding")
         );
@@ -84,7 +84,7 @@ fn describe(checked: &Checked) -> String {
     let [x, y, z] = checked.joint_mm;
     let [dx, dy, dz] = checked.axis;
     let mut lines = vec![
-        "scan       the one that the case was made from".to_owned(),
+        "scan       unchanged since the case was written".to_owned(),
         format!("joint      {x:.1} {y:.1} {z:.1} mm (LPS)"),
         format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
         format!("changed    {}", changes(checked.changed.as_ref())),
@@ -100,7 +100,7 @@ fn describe(checked: &Checked) -> String {
 
 fn changes(drift: Option<&Drift>) -> String {
     let Some(drift) = drift else {
-        return "unknown: the file holds no landmarks that can be compared".to_owned();
+        return "unknown: the file contains no landmarks that can be compared".to_owned();
     };
     if drift.is_none() {
         return "nothing since the case was written".to_owned();

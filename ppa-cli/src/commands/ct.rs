@@ -56,7 +56,7 @@ fn describe(info: &Info) -> String {
     for series in &info.series {
         let name = series
             .number
-            .map_or("without number".to_owned(), |n| n.to_string());
+            .map_or("without a number".to_owned(), |n| n.to_string());
         let left = match &series.refused {
             Some(reason) => format!(", refused: {reason}"),
             None if series.read => String::new(),

@@ -47,7 +47,7 @@ pub fn run(command: &DepthCommand, output: Output) -> anyhow::Result<()> {
 fn read_camera(path: Option<&PathBuf>) -> anyhow::Result<Camera> {
     let spec = match path {
         Some(path) => CameraSpec::read(path).context(
-            "--camera takes a camera JSON; `ppa depth camera` makes one of a calibration file",
+            "--camera expects a camera JSON file; `ppa depth camera` makes one from a calibration file",
         )?,
         None => CameraSpec::azure_kinect(DepthMode::NfovUnbinned),
     };

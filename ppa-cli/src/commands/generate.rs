@@ -129,7 +129,7 @@ pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
         summary.made
     );
     if summary.replaced > 0 {
-        text += &format!(", {} in place of others", summary.replaced);
+        text += &format!(", {} replacing others", summary.replaced);
     }
     if summary.removed > 0 {
         text += &format!(

@@ -185,7 +185,7 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
             text += "; its first convolution is new (--first-conv)";
         }
         if exported.fresh_classifier {
-            text += "; its classifier is new, as the file's has another number of outputs";
+            text += "; its classifier is new, since the file's has a different number of outputs";
         }
         text + &not_taken(&exported.kept, &exported.unused)
     })

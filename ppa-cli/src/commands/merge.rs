@@ -51,5 +51,5 @@ pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
         working.finish_and_clear();
         require_none(&args.out, &problems)?;
     }
-    output.print(&summary, |s| describe(s, &args.out, "brought in"))
+    output.print(&summary, |s| describe(s, &args.out, "added"))
 }

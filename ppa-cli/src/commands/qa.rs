@@ -36,7 +36,7 @@ pub fn run(args: &QaArgs, output: Output) -> anyhow::Result<()> {
     let size = page.len() as u64;
     output.print(&json!({ "page": path, "bytes": size }), |_| {
         format!(
-            "{}: {}, to be opened in any browser",
+            "{}: {}; open it in any browser",
             path.display(),
             bytes(size)
         )

@@ -48,7 +48,7 @@ fn jobs(root: &Path, output: Output) -> anyhow::Result<bool> {
     let submission = submission.ok_or_else(|| FolderError::NotSubmitted(root.to_owned()))?;
     let queue = Slurm.queue(&folder.job_name()).unwrap_or_else(|error| {
         stderr::warning(&format!(
-            "shards that run or wait are shown as failed or missing: {error}"
+            "running and pending shards are shown as failed or missing: {error}"
         ));
         Vec::new()
     });

@@ -68,7 +68,10 @@ impl StudioArgs {
             [] => return Ok(None),
             [left] => (left, None),
             [left, right] => (left, Some(right)),
-            more => bail!("--run names {} folders, expected one or two", more.len()),
+            more => bail!(
+                "--run specifies {} folders, expected one or two",
+                more.len()
+            ),
         };
         Ok(Some(Networks {
             left: left.clone(),
@@ -94,10 +97,10 @@ impl StudioArgs {
 
 pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
     if !args.bind.is_loopback() {
-        const MEANING: &str = "who reaches this address and learns the token, which travels unencrypted, sees the scan, can change case and plan, and make datasets beside the plan";
+        const MEANING: &str = "anyone who can reach this address and learns the token, which is sent unencrypted, can see the scan, change the case and the plan, and make datasets next to the plan";
         if !args.i_know {
             bail!(
-                "--bind {} is not this machine alone: {MEANING}; forward a port over ssh instead, or give --i-know",
+                "--bind {} is reachable from other machines: {MEANING}; forward a port over ssh instead, or give --i-know",
                 args.bind
             );
         }

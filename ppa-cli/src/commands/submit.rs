@@ -388,7 +388,7 @@ fn describe(submitted: &Submitted) -> String {
         (Some(poses), _) => {
             let source = match poses.cost_source {
                 CostSource::Measured => "measured on one pose of the first limb",
-                CostSource::Given => "as --pose-seconds says",
+                CostSource::Given => "given by --pose-seconds",
             };
             let short = match poses.task_s < SHORT_S {
                 true => ", less than the 20 minutes that suit a scheduler",

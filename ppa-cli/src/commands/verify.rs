@@ -46,7 +46,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
             let beside = args.dataset.with_extension("toml");
             anyhow::ensure!(
                 beside.exists(),
-                "{} is not there; name the plan that {} was made from with --plan",
+                "{} does not exist; use --plan to give the plan that {} was made from",
                 beside.display(),
                 args.dataset.display()
             );
@@ -76,7 +76,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     };
     output.print(&verified, |v| {
         format!(
-            "{}: {} of {} as they were made; {} made again with the same result",
+            "{}: {} of {} unchanged; {} made again with the same result",
             args.dataset.display(),
             count(v.images, "image"),
             count(v.units, "pose"),

@@ -243,7 +243,7 @@ fn a_case_with_all_choices_is_read_as_it_was() {
     let said = succeed(folder, "case check leg.case.toml");
     contains(
         &said,
-        &["the one that the case was made from", "nothing since"],
+        &["unchanged since the case was written", "nothing since"],
     );
 }
 

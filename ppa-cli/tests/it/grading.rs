@@ -60,7 +60,7 @@ fn readers_get_pictures_without_a_trace_of_what_they_show() {
         assert!(!page.contains(image) && !page.contains(sha256));
     }
     let refused = fail(here, "label export data --out o2 --key o2/key.csv");
-    assert!(refused.contains("would lie in the folder for readers"));
+    assert!(refused.contains("would be in the folder for readers"));
     assert!(!here.join("o2").exists());
     let refused = fail(here, "label export data --out o2 --every-deg 0.7");
     assert!(refused.contains("--every-deg is 0.7"), "{refused}");

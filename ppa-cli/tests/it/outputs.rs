@@ -180,6 +180,6 @@ fn one_file_for_two_outputs_is_refused() {
         "ct phantom --out x.nii --labels x.nii",
     ] {
         let said = fail(folder.path(), command);
-        assert!(said.contains("name one file"), "{said}");
+        assert!(said.contains("name the same file"), "{said}");
     }
 }

@@ -270,7 +270,10 @@ fn tables_are_marked_while_results_are_missing() {
         let said = String::from_utf8(refused.stderr).unwrap();
         contains(
             &said,
-            &["names no imagenet_weights", "experiment_2a.md exists"],
+            &[
+                "does not specify imagenet_weights",
+                "experiment_2a.md exists",
+            ],
         );
     }
     succeed(

@@ -171,12 +171,21 @@ fn options_of_cases_and_of_meshes_are_not_mixed() {
     let skin = phantom().join("p01.ply");
     let (case, skin) = (case.display(), skin.display());
     for (arguments, part) in [
-        (format!("{skin} --angle 5"), "--angle belongs to a case"),
-        (format!("{skin} --view left"), "--view belongs to a case"),
-        (format!("{case} --frames 3"), "--frames belongs to meshes"),
+        (
+            format!("{skin} --angle 5"),
+            "--angle applies only to a case",
+        ),
+        (
+            format!("{skin} --view left"),
+            "--view applies only to a case",
+        ),
+        (
+            format!("{case} --frames 3"),
+            "--frames applies only to meshes",
+        ),
         (
             format!("{case} --camera c.json"),
-            "--camera belongs to meshes",
+            "--camera applies only to meshes",
         ),
         (format!("{case} {skin}"), "render it alone"),
     ] {

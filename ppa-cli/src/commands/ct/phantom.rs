@@ -162,7 +162,7 @@ fn limb(args: &PhantomArgs) -> anyhow::Result<(String, Limb, Option<Truth>)> {
     let side = Side::from(args.side);
     if args.limb == LimbName::Knee {
         if args.plate || args.name.is_some() || args.seed.is_some() {
-            bail!("--limb knee is one shape: it takes neither --name, --seed nor --plate");
+            bail!("--limb knee is a single shape: --name, --seed and --plate do not apply to it");
         }
         return Ok((format!("{side} knee"), Limb::knee(side), None));
     }

@@ -97,7 +97,7 @@ fn describe(checked: &Checked) -> String {
         count(found.radiographs, "radiograph"),
         count(found.labelled, "pair"),
         if found.manifest {
-            "all as in manifest.jsonl"
+            "all match manifest.jsonl"
         } else {
             "no manifest.jsonl"
         },

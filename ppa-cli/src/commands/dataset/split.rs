@@ -34,7 +34,7 @@ pub struct SplitArgs {
 fn part(text: &str) -> Result<(String, f64), String> {
     let (name, share) = text
         .split_once('=')
-        .ok_or("expected NAME=SHARE, as train=0.7")?;
+        .ok_or("expected NAME=SHARE, such as train=0.7")?;
     let share = share
         .parse()
         .map_err(|_| format!("{share:?} is not a number"))?;

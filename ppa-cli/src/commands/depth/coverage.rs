@@ -128,12 +128,12 @@ fn places(args: &CoverageArgs, joint: &JointInRoom) -> anyhow::Result<Vec<Camera
     );
     let odd = |mm: &&f64| !(1.0..=1e5).contains(*mm);
     if let Some(mm) = args.distances_mm.iter().find(odd) {
-        anyhow::bail!("--distances-mm holds {mm}, expected 1 to 100000");
+        anyhow::bail!("--distances-mm contains {mm}, expected 1 to 100000");
     }
     let dome = Viewpoint::dome(args.step_deg, args.lowest_deg, &args.distances_mm);
     anyhow::ensure!(
         dome.len() <= MOST_PLACES,
-        "{} places are to be tried, expected at most {MOST_PLACES}: take a larger --step-deg",
+        "{} places to try, expected at most {MOST_PLACES}: use a larger --step-deg",
         dome.len()
     );
     places.extend(dome.into_iter().map(|viewpoint| CameraPlace {

@@ -43,7 +43,7 @@ fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
             ),
         }
     }
-    anyhow::ensure!(!points.is_empty(), "{} holds no points", path.display());
+    anyhow::ensure!(!points.is_empty(), "{} contains no points", path.display());
     Ok(points)
 }
 

@@ -127,7 +127,7 @@ impl RenderArgs {
         }
         if let Some(option) = self.of_case.given() {
             bail!(
-                "{option} belongs to a case, but {} is a mesh",
+                "{option} applies only to a case, but {} is a mesh",
                 self.meshes[0].display()
             );
         }

@@ -137,7 +137,7 @@ fn refuse_options_of_meshes(path: &Path, args: &RenderArgs) -> anyhow::Result<()
     ];
     if let Some((option, _)) = given.into_iter().find(|(_, given)| *given) {
         bail!(
-            "{option} belongs to meshes, but {} is a case: its cameras are those of --plan or --room",
+            "{option} applies only to meshes, but {} is a case: its cameras are those of --plan or --room",
             path.display()
         );
     }

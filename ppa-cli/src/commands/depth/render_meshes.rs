@@ -135,17 +135,21 @@ fn read_pose(path: &Path, name: Option<&str>) -> anyhow::Result<Isometry3<f64>> 
             let known = || motions.keys().cloned().collect::<Vec<_>>().join(", ");
             let name = name.with_context(|| {
                 format!(
-                    "{} holds several motions; --motion chooses one of {}",
+                    "{} contains several motions; choose one with --motion: {}",
                     path.display(),
                     known()
                 )
             })?;
             *motions.get(name).with_context(|| {
-                format!("{} holds no motion {name}, but {}", path.display(), known())
+                format!(
+                    "{} contains no motion {name}, only {}",
+                    path.display(),
+                    known()
+                )
             })?
         }
         (_, Some(name)) => bail!(
-            "{} holds one matrix without a name, not the motion {name}",
+            "{} contains one matrix without a name, not the motion {name}",
             path.display()
         ),
     };

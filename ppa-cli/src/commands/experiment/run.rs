@@ -157,7 +157,7 @@ fn carry_out_all(
     let part = shard(args.shard)?.part(|| Ok(None))?;
     let left_out = |e: &Experiment| plan.configurations(*e).len() < e.configurations().len();
     if experiments.iter().any(left_out) {
-        stderr::warning("the plan names no imagenet_weights: their column is left out");
+        stderr::warning("the plan does not specify imagenet_weights: their column is left out");
     }
     require_writable("--out", &out)?;
     let prepared = experiments

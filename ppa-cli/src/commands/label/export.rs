@@ -56,7 +56,7 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     let key = args.key.clone().unwrap_or_else(|| beside(&args.out));
     ensure!(
         !std::path::absolute(&key)?.starts_with(std::path::absolute(&args.out)?),
-        "the key {} would lie in the folder for readers, {}",
+        "the key {} would be in the folder for readers, {}",
         key.display(),
         args.out.display()
     );

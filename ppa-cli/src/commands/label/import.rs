@@ -42,7 +42,7 @@ pub fn run(args: &ImportArgs, output: Output) -> anyhow::Result<()> {
 
 fn describe(done: &Imported) -> String {
     let mut lines = vec![format!(
-        "{} labelled by {}; {} kept aside",
+        "{} labelled by {}; {} set aside",
         count(done.labelled, "radiograph"),
         count(done.readers, "reader"),
         count(done.repeats, "repeat")
@@ -55,13 +55,13 @@ fn describe(done: &Imported) -> String {
     }
     if done.kept_computed > 0 {
         lines.push(format!(
-            "{} of the same limbs without a grade: the computed label stays",
+            "{} of the same limbs without a grade: computed label kept",
             count(done.kept_computed, "radiograph")
         ));
     }
     if done.without_label > 0 {
         lines.push(format!(
-            "without a label, as they were not graded: {} of the same limbs",
+            "{} of the same limbs without a label: not graded",
             count(done.without_label, "radiograph")
         ));
     }

@@ -119,7 +119,7 @@ fn divided(
         );
         ensure!(
             is_same_kind,
-            "{} holds other work, {} of {}: choose another --out",
+            "{} contains other work, {} of {}: choose another --out",
             folder.root().display(),
             count(kept.work.tasks(), kept.work.task_name()),
             kept.plan.display()

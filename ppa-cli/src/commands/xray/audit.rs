@@ -32,7 +32,7 @@ pub fn run(args: &AuditArgs, output: Output) -> anyhow::Result<()> {
     let audit = if path.extension().is_some_and(|ending| ending == "toml") {
         anyhow::ensure!(
             args.scan.options() == ReadOptions::default(),
-            "{} is a case, which states how its scan is read: --series, --fill-gaps and --force are for scans",
+            "{} is a case, which states how its scan is read: --series, --fill-gaps and --force apply only to scans",
             path.display()
         );
         let case = Case::read(path)?;

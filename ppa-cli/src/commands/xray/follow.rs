@@ -92,13 +92,13 @@ impl AnalogArgs {
             });
         }
         let beside = image.or(self.dose_map.as_deref());
-        let beside = beside.context("no output was named")?;
+        let beside = beside.context("no output was specified")?;
         let mut path = beside.as_os_str().to_owned();
         path.push(".tally");
         let path = PathBuf::from(path);
         anyhow::ensure!(
             replace || !path.exists(),
-            "{0} holds the histories of a run that was stopped: continue it with --tally {0} --resume, or give --replace to \
+            "{0} contains the histories of a run that was stopped: continue it with --tally {0} --resume, or give --replace to \
              begin again",
             path.display()
         );
@@ -249,13 +249,13 @@ impl AnalogArgs {
         if let Some(seconds) = self.time {
             anyhow::ensure!(
                 seconds > 0.0 && seconds <= 1e9,
-                "--time is {seconds}, expected seconds above 0 and up to 1e9"
+                "--time is {seconds}, expected a number of seconds above 0 and up to 1e9"
             );
         }
         if let Some(percent) = self.target_error {
             anyhow::ensure!(
                 percent > 0.0 && percent < 100.0,
-                "--target-error is {percent}, expected percent between 0 and 100"
+                "--target-error is {percent}, expected a percentage between 0 and 100"
             );
         }
         Ok(Stop {

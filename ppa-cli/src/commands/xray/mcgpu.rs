@@ -104,7 +104,7 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
     let interrupt = Interrupt::listen()?;
     let is_new = !args.out.exists();
     fs::create_dir_all(&args.out)
-        .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+        .with_context(|| format!("cannot create the folder {}", args.out.display()))?;
 
     let watch = Stopwatch::start();
     let scanned = args

@@ -30,7 +30,8 @@ pub fn follow_part(
     output: Output,
 ) -> anyhow::Result<()> {
     let out = scan_part.folder;
-    fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    fs::create_dir_all(out)
+        .with_context(|| format!("cannot create the folder {}", out.display()))?;
     require_room(out, simulation.missing_part_bytes(scan_part)?)?;
     let interrupt = Interrupt::listen()?;
     let working = working("following photons");
