@@ -28,7 +28,7 @@ impl CameraMove {
             return Ok(());
         }
         Err(StudioError::Invalid(format!(
-            "a camera is shifted by {:?} mm and turned by {:?} degrees, expected at most {FARTHEST_MM} mm and 180 degrees",
+            "a camera is shifted by {:?} mm and rotated by {:?} degrees, expected at most {FARTHEST_MM} mm and 180 degrees",
             self.shift_mm, self.turn_deg
         )))
     }

@@ -18,16 +18,16 @@ pub enum StudioError {
     #[error("{} is a scan: give the side of its limb, --side l or --side r", .0.display())]
     NoSide(PathBuf),
     /// A plan names no case.
-    #[error("{} names no case", .0.display())]
+    #[error("{} does not specify a case", .0.display())]
     NoCase(PathBuf),
     /// Frames are to be judged without networks.
-    #[error("frames are watched, but no networks judge them")]
+    #[error("frames are watched, but no networks are given to judge them")]
     NoNetworks,
     /// A dataset, trainings or frames are open, but no limb.
     #[error("no limb is open")]
     NoLimb,
     /// A limb whose case is not known.
-    #[error("the plan beside the dataset names no case of {0}")]
+    #[error("the plan next to the dataset has no case for {0}")]
     NotInPlan(LimbId),
     /// The quality report of a dataset.
     #[error(transparent)]
@@ -120,7 +120,7 @@ pub enum StudioError {
     #[error(transparent)]
     Surface(#[from] ppa_mesh::SurfaceError),
     /// The text of a plan.
-    #[error("the plan is not TOML")]
+    #[error("the plan is not valid TOML")]
     Toml(#[source] toml::de::Error),
     /// The text of a plan, to be changed.
     #[error(transparent)]
@@ -144,7 +144,7 @@ pub enum StudioError {
     #[error("{} is being made: pause it first", .0.display())]
     Generating(PathBuf),
     /// Threads for a run.
-    #[error("no threads can be started")]
+    #[error("cannot start threads")]
     Threads(#[source] rayon::ThreadPoolBuildError),
     /// A picture.
     #[error("the picture cannot be encoded")]
@@ -168,7 +168,7 @@ pub enum StudioError {
     #[error("a later request replaced this one")]
     Superseded,
     /// Random bytes for the address.
-    #[error("the operating system gives no random numbers: {0}")]
+    #[error("the operating system does not provide random numbers: {0}")]
     Random(getrandom::Error),
     /// The address cannot be used.
     #[error("cannot listen on {address}")]

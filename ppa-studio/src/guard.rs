@@ -76,11 +76,11 @@ fn judged(token: &Token, request: &Request) -> Judged {
     let host = text(HOST).unwrap_or_default();
     if !is_localhost_or_ip(host) {
         return Judged::Refused(
-            "open this page by localhost or an IP address, not by another name",
+            "open this page via localhost or an IP address, not via another host name",
         );
     }
     if text(ORIGIN).is_some_and(|origin| origin.strip_prefix("http://") != Some(host)) {
-        return Judged::Refused("requests of other pages are refused");
+        return Judged::Refused("requests from other pages are refused");
     }
     if *request.method() != Method::GET && text(ORIGIN).is_none() {
         return Judged::Refused("a change must come from the page itself");
@@ -92,7 +92,9 @@ fn judged(token: &Token, request: &Request) -> Judged {
     if request.uri().path() == "/" && given.is_some_and(|given| token.is(given)) {
         return Judged::Enters;
     }
-    Judged::Refused("the address needs its token: open the address that `ppa studio` printed")
+    Judged::Refused(
+        "the address must include its token: open the address that `ppa studio` printed",
+    )
 }
 
 /// Whether a Host header is localhost or an IP address, for which nobody else's name server can answer; the port may be that of a forwarding.

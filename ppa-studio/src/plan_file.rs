@@ -124,7 +124,7 @@ impl PlanFile {
         let limbs = document.get_mut("case");
         let limbs = limbs.and_then(Item::as_array_of_tables_mut);
         let limbs = limbs.ok_or_else(|| {
-            let message = "the limbs of this plan are not tables [[case]]: change them in the file";
+            let message = "the limbs of this plan are not [[case]] tables: edit them in the file";
             StudioError::Invalid(message.to_owned())
         })?;
         change.apply(limbs, &self.plan(text)?, self.folder())?;
@@ -216,7 +216,7 @@ impl PlanFile {
             FieldKind::Heading | FieldKind::Number | FieldKind::Rows | FieldKind::Toml => {
                 let value = typed.trim().parse();
                 value.map_err(|_| {
-                    StudioError::Invalid(format!("{key} is {typed}, which is not a value of TOML"))
+                    StudioError::Invalid(format!("{key} is {typed}, which is not a TOML value"))
                 })
             }
         }
@@ -238,7 +238,7 @@ impl PlanFile {
             return Ok(());
         }
         Err(StudioError::Invalid(format!(
-            "{} is not below the folder of the plan; other files are named in the plan by hand",
+            "{} is not below the folder of the plan; edit the plan file to use other files",
             path.display()
         )))
     }
@@ -360,7 +360,7 @@ to_deg = 20.0
         };
         assert!(refused("rotation.step_deg", "0.3").contains("step_deg"));
         assert!(refused("depth.roi_mm", "-3").contains("depth.roi_mm is -3"));
-        assert!(refused("depth.roi_mm", "wide").contains("not a value of TOML"));
+        assert!(refused("depth.roi_mm", "wide").contains("not a TOML value"));
         assert!(refused("shapes.variants", "").contains("shapes.variants is empty"));
         assert!(refused("case.file", "x").contains("the form has no case.file"));
     }

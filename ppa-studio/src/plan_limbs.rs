@@ -38,7 +38,7 @@ impl LimbChange {
             Self::Add { case } => {
                 if !cases_beside(folder, plan)?.contains(case) {
                     return Err(StudioError::Invalid(format!(
-                        "{case} is not a case file in the plan's folder, or the plan names it already"
+                        "{case} is not a case file in the plan's folder, or is already in the plan"
                     )));
                 }
                 let file = folder.join(case);
@@ -117,7 +117,7 @@ fn patient_of_case(case: &Case, plan: &Plan) -> Result<u32, StudioError> {
     };
     last.checked_add(1).ok_or_else(|| {
         StudioError::Invalid(format!(
-            "patient {last} of the plan is the last possible number"
+            "patient number {last} in the plan is already the largest possible"
         ))
     })
 }
@@ -144,7 +144,7 @@ fn require_other_limb(
                 Side::Left => "left",
             };
             Err(StudioError::Invalid(format!(
-                "{name} is the {side} limb of patient {patient} already"
+                "{name} is already the {side} limb of patient {patient}"
             )))
         }
     }

@@ -165,7 +165,7 @@ export class DatasetPanel {
   openers(pose) {
     const { patient, side } = pose;
     if (!this.found.at_hand.some((limb) => limbKey(limb) === limbKey(pose))) {
-      return [element("p", "No plan with the case of this limb lies beside the dataset, so that it cannot be opened in step 5.", { class: "hint" })];
+      return [element("p", "There is no plan with the case of this limb next to the dataset, so the pose cannot be opened in step 5.", { class: "hint" })];
     }
     return [button("Open in step 5", async () => {
       try {

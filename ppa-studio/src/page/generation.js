@@ -11,8 +11,8 @@ const PROGRESS_MS = 1000;
 const SHEET_MS = 4000;
 
 const PHASES = {
-  absent: "Nothing is made yet.", running: "Being made.", stopping: "Finishing the poses under way.",
-  elsewhere: "Another program makes it now.", paused: "Paused.", complete: "Complete.", failed: "Ended early.",
+  absent: "Nothing is made yet.", running: "Being made.", stopping: "Finishing the poses in progress.",
+  elsewhere: "Another program is making it.", paused: "Paused.", complete: "Complete.", failed: "Ended early.",
 };
 
 const size = (bytes) => (bytes >= 1e9 ? `${fixed(bytes / 1e9)} GB` : `${fixed(bytes / 1e6)} MB`);
@@ -89,7 +89,7 @@ export class GenerationPanel {
     const left = phase === "running" && made_now > 0 ? `, about ${duration(elapsed_s / made_now * (pose_jobs - made))} left` : "";
     byId("progress-text").textContent = pose_jobs ? `${made} of ${pose_jobs} poses${left}` : "";
     byId("generate").disabled = runs || phase === "elsewhere" || phase === "complete";
-    byId("generate").textContent = made > 0 || phase === "paused" ? "Go on" : "Start";
+    byId("generate").textContent = made > 0 || phase === "paused" ? "Resume" : "Start";
     byId("pause").disabled = phase !== "running";
     byId("command-list").replaceChildren(...commandRows([commands.forecast, commands.generate, commands.status]));
     this.choices(limbs);
@@ -135,7 +135,7 @@ export class GenerationPanel {
 
   shards(shards) {
     byId("shards").hidden = shards.length === 0;
-    const word = (shard) => (shard.complete ? "complete" : shard.running ? "being made" : shard.made > 0 ? "incomplete" : "not begun");
+    const word = (shard) => (shard.complete ? "complete" : shard.running ? "being made" : shard.made > 0 ? "incomplete" : "not started");
     const rows = shards.map((shard) => [shard.shard, word(shard), `${shard.made} of ${shard.pose_jobs || "?"}`]);
     byId("shard-table").replaceChildren(table(["Shard", "State", "Poses"], rows));
   }

@@ -178,14 +178,14 @@ export class GradingPanel {
     const { pictures, grades, file, key_found } = this.found;
     const count = Object.keys(grades).length;
     const saved = count > 0 ? `, saved in ${file}` : "";
-    const key = key_found ? "; pictures and order are those of the key that was there" : "";
+    const key = key_found ? "; pictures and order are those of the existing key" : "";
     byId("grading-text").textContent = `${count} of ${pictures.length} pictures graded${saved}${key}`;
     this.showCommands();
   }
 
   async import() {
     const { readers } = this.place();
-    if (!window.confirm(`Make labels of all grades in ${readers}? In labels.json they take the place of computed labels, which stay in labels.computed.json.`)) return;
+    if (!window.confirm(`Make labels from all grades in ${readers}? In labels.json they take the place of computed labels, which stay in labels.computed.json.`)) return;
     byId("grading-refused").textContent = "";
     try {
       const done = await postJson("grading/import", this.place());

@@ -6,7 +6,7 @@ import { add, angleDeg, fixed, norm, planeNormal, point, scale, sub } from "/pag
 
 const byId = (id) => document.getElementById(id);
 const REGIONS = [["joint_region", "Region at the joint"], ["calf_region", "Region away from it"]];
-const KINDS = { lower_leg: "Lower leg with an ankle", knee: "Knee", other: "Another limb: set joint, axis and plane by hand; the joint found is the middle of the limb" };
+const KINDS = { lower_leg: "Lower leg with an ankle", knee: "Knee", other: "Another limb: set joint, axis and plane manually; the joint found is the middle of the limb" };
 const PICKS = ["distal plane point", "proximal plane point 1", "proximal plane point 2"];
 
 export class LandmarkPanel {
@@ -143,7 +143,7 @@ export class LandmarkPanel {
       state.textContent = "found";
     } else {
       state.className = "chosen";
-      state.textContent = `chosen, ${away} from what is found `;
+      state.textContent = `chosen, ${away} from the one found `;
       const again = document.createElement("button");
       again.type = "button";
       again.textContent = "Find again";

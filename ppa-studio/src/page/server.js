@@ -8,7 +8,7 @@ export class Refused extends Error {
 }
 
 // The program may have ended, or the way to it, such as a forwarded port.
-const SILENT = "ppa studio does not answer. Check the connection, or start it again: this page continues when it answers. What was changed is saved.";
+const SILENT = "ppa studio does not answer. Check the connection, or start it again: this page continues when it answers. Your changes are saved.";
 // Pause between two attempts to reach a program that does not answer, ms.
 const RETRY_MS = 1000;
 

@@ -36,7 +36,7 @@ function span(seconds) {
 function state(training) {
   if (training.error) return training.error;
   if (training.finished) return "finished";
-  if (training.silent_s === null) return "not begun";
+  if (training.silent_s === null) return "not started";
   return runs(training) ? "running" : `stopped ${span(training.silent_s)} ago`;
 }
 
@@ -100,7 +100,7 @@ export class TrainingPanel {
     const rows = found.slice(0, LISTED).map((training) => this.row(training));
     const none = element("p", this.trainings.length ? "No name contains this text." : "There are no trainings here. “ppa train” makes one; “ppa studio FOLDER” opens a folder of trainings.", { class: "hint" });
     byId("training-table").replaceChildren(rows.length ? table(["Training", "Steps", "Loss", "MAE", "r_s", "State", "Errors"], rows) : none);
-    if (found.length > LISTED) byId("training-table").append(element("p", `and ${found.length - LISTED} more: type a part of their names at the right`, { class: "hint" }));
+    if (found.length > LISTED) byId("training-table").append(element("p", `and ${found.length - LISTED} more: type part of their names on the right`, { class: "hint" }));
     if (focused?.startsWith("training-of-")) byId(focused)?.focus();
   }
 

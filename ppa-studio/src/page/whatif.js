@@ -227,7 +227,7 @@ export class WhatIfPanel {
       const label = await postJson("label", whatIf);
       byId("label").textContent = label
         ? `Computed label ${fixed(label.label)} ± ${fixed(label.std)} (${label.label < 2.5 ? "diagnostic" : "not diagnostic"}): ${label.gutters.map(gutterText).join(", ")}`
-        : "No computed label: the case names no bones (ppa prepare --bones or --segment-bones)";
+        : "No computed label: the case does not specify bones (ppa prepare --bones or --segment-bones)";
     } catch (error) {
       this.failed(error);
     }

@@ -102,9 +102,7 @@ fn a_limb_is_opened_where_the_plan_names_its_case() {
     );
     let other = browser.post("/api/dataset/open", &json!({ "patient": 4, "side": "l" }));
     assert!(
-        other
-            .text()
-            .contains("names no case of limb l of patient 4"),
+        other.text().contains("has no case for limb l of patient 4"),
         "{}",
         other.text()
     );
