@@ -64,7 +64,7 @@ pub fn first_fastest<T: Element + Copy>(
     }
     let Ok(elements) = typed.as_slice() else {
         return Err(PyValueError::new_err(format!(
-            "{name} does not begin at a multiple of the size of its elements, expected a copy of it"
+            "{name} is not aligned to the size of its elements, expected an aligned copy"
         )));
     };
     if typed.is_fortran_contiguous() {
@@ -87,7 +87,7 @@ pub fn required<'py>(
 pub fn numbers(object: &Bound<'_, PyAny>, name: &str, expected: &[usize]) -> PyResult<Vec<f64>> {
     let py = object.py();
     let array = required(object, Some("float64")).map_err(|error| {
-        let refused = PyTypeError::new_err(format!("{name} is no array of numbers"));
+        let refused = PyTypeError::new_err(format!("{name} is not an array of numbers"));
         refused.set_cause(py, Some(error));
         refused
     })?;

@@ -118,7 +118,9 @@ pub fn run<T: Send + 'static>(
             }
             Err(RecvTimeoutError::Timeout) => Ok(()),
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(InternalError::new_err("a computation ended without result"));
+                return Err(InternalError::new_err(
+                    "a computation ended without a result",
+                ));
             }
         };
         if let Err(error) = seen.and_then(|()| py.check_signals()) {

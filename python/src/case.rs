@@ -117,7 +117,7 @@ impl PyCase {
         let limb = self.limb();
         if !limb.is_of_file() {
             return Err(PyValueError::new_err(
-                "the scan of this case lies in no file, and a case names one: save the volume, and prepare what Volume.read returns",
+                "the scan of this case is not in a file, and a saved case must refer to one: save the volume, then prepare the one that Volume.read returns",
             ));
         }
         limb.case.write(&path).or_raise()

@@ -116,7 +116,7 @@ impl Exposure {
         let given = [histories.is_some(), mas.is_some(), exposure_index.is_some()];
         if given.iter().filter(|given| **given).count() > 1 {
             return Err(PyValueError::new_err(
-                "histories, mas and exposure_index exclude each other: give one of them",
+                "histories, mas and exposure_index are mutually exclusive: give only one of them",
             ));
         }
         settings.analog = None; // The engine of the call decides.

@@ -26,7 +26,7 @@ fn limb(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult<Limb
     let knee = name.eq_ignore_ascii_case("knee");
     if knee && (seed.is_some() || plate) {
         return Err(PyValueError::new_err(
-            "the knee is one shape: it takes neither seed nor plate",
+            "the knee is a single shape: seed and plate do not apply to it",
         ));
     }
     match knee {

@@ -72,7 +72,7 @@ fn held<T>(kept: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Why the joint space of a limb cannot be graded.
 #[derive(Debug, thiserror::Error)]
 pub enum LabelError {
-    #[error("the case names no bones: prepare it with bones or segment_bones")]
+    #[error("the case does not specify bones: prepare it with bones or segment_bones")]
     NoBones,
     #[error(transparent)]
     Bones(#[from] BoneFileError),

@@ -174,7 +174,7 @@ pub fn prepare(
     if axis.is_some() && (axis_source.is_some() || joint_region.is_some() || calf_region.is_some())
     {
         return Err(PyValueError::new_err(
-            "axis stands instead of axis_source, joint_region and calf_region: give one or the other",
+            "axis replaces axis_source, joint_region and calf_region: give one or the other",
         ));
     }
     let side = crate::side::side(side)?;
@@ -226,7 +226,7 @@ pub fn prepare(
         (None, Some(target)) => Some(separated(target, &path, replace)?),
         (Some(_), Some(_)) => {
             return Err(PyValueError::new_err(
-                "bones are those of a file, segment_bones separates them: give one or the other",
+                "bones reads bones from a file, segment_bones segments them in the scan: give one or the other",
             ));
         }
     };

@@ -88,7 +88,7 @@ impl PyScene {
         let plan = match (plan, room) {
             (Some(_), Some(_)) => {
                 return Err(PyValueError::new_err(
-                    "plan and room are both given: a plan has its room",
+                    "plan and room are both given: a plan already has a room",
                 ));
             }
             (None, Some(room)) => Arc::new(Plan::in_room(&room).or_raise()?),

@@ -70,7 +70,7 @@ impl PyTransport {
         let (density, of_density) = first_fastest::<f32>(density_g_cm3, "density_g_cm3", 3)?;
         if size != of_density {
             return Err(PyValueError::new_err(format!(
-                "material has the shape {size:?}, density_g_cm3 {of_density:?}: expected the same"
+                "material has the shape {size:?}, density_g_cm3 {of_density:?}: expected the same shape"
             )));
         }
         let named = materials
@@ -121,7 +121,7 @@ impl PyTransport {
             let (mask, size) = first_fastest::<bool>(mask, "mask", 3)?;
             if size != volume.grid().size() {
                 return Err(PyValueError::new_err(format!(
-                    "mask has the shape {size:?}, expected {:?} as the volume",
+                    "mask has the shape {size:?}, expected {:?}, that of the volume",
                     volume.grid().size()
                 )));
             }

@@ -50,7 +50,7 @@ pub fn table(dict: &Bound<'_, PyDict>, name: &str) -> PyResult<Table> {
     for (key, item) in dict {
         let key: String = key
             .extract()
-            .map_err(|_| PyTypeError::new_err(format!("a key of {name} is no text")))?;
+            .map_err(|_| PyTypeError::new_err(format!("a key of {name} is not text")))?;
         if !item.is_none() {
             let value = value(&item, &format!("{name}.{key}"))?;
             table.insert(key, value);

@@ -144,7 +144,7 @@ def test_labels_that_differ_are_not_replaced_unasked(dataset: Path, tmp_path: Pa
 
 
 def test_what_cannot_be_labelled_is_refused(files: Files, case: ppa.Case, dataset: Path) -> None:
-    with pytest.raises(ppa.PpaError, match="names no bones"):
+    with pytest.raises(ppa.PpaError, match="does not specify bones"):
         case.place(0).label()
     for settings, says in [
         ({"scale": "kind"}, "no scale \"kind\""),
