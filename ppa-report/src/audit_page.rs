@@ -194,7 +194,7 @@ fn histogram(hu: Values) -> Markup {
     html! {
         h2 { "Hounsfield units" }
         div role="img" { (PreEscaped(chart.to_inline_svg())) }
-        p { "Air lies at -1000 HU, water at 0." }
+        p { "Air is at -1000 HU, water at 0 HU." }
     }
 }
 

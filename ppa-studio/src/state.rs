@@ -290,6 +290,6 @@ pub(crate) fn named_folder(
         return Ok(found);
     }
     Err(StudioError::Invalid(format!(
-        "{name:?} is not the name of a folder beside {neighbour}"
+        "{name:?} is not the name of a folder next to {neighbour}"
     )))
 }

@@ -143,7 +143,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         }
         (None, _) => {
             let path = args.out.with_extension("png");
-            outputs.file_in_new_folder("the picture beside the case,", &path, PICTURE)?;
+            outputs.file_in_new_folder("the picture next to the case,", &path, PICTURE)?;
             Some(path)
         }
     };

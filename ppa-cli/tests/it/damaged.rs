@@ -33,7 +33,7 @@ fn a_dataset_is_verified_by_making_a_part_of_it_again() {
     fs::rename(folder.path().join("plan"), folder.path().join("moved")).unwrap();
     let said = fail(folder.path(), "verify moved");
     assert!(
-        said.contains("moved.toml does not exist; use --plan") && said.contains("--plan"),
+        said.contains("moved.toml does not exist; use --plan"),
         "{said}"
     );
     fs::rename(folder.path().join("moved"), folder.path().join("plan")).unwrap();

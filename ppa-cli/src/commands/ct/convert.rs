@@ -65,7 +65,7 @@ impl ConvertArgs {
                 .crop_world(&Point3::from(min), &Point3::from(max))
                 .map_err(|error| match error {
                     VolumeError::Memory { .. } => error.into(),
-                    _ => anyhow!("no voxel centre lies in the box of --crop-mm"),
+                    _ => anyhow!("the box of --crop-mm contains no voxel centre"),
                 })?;
         }
         if let Some(spacing) = self.spacing_mm {
