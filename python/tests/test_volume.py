@@ -128,7 +128,7 @@ def test_importing_ppa_imports_neither_numpy_nor_others() -> None:
         (np.zeros((2, 2, 2)), np.eye(4), ValueError, "float64 of shape (2, 2, 2), expected int16 or float32"),
         (np.zeros((2, 2), np.int16), np.eye(4), ValueError, "expected int16 with 3 dimensions"),
         (np.zeros((4, 4, 4), np.int16)[::2], np.eye(4), ValueError, "not contiguous"),
-        (np.frombuffer(bytearray(17), np.int16, 8, 1).reshape(2, 2, 2), np.eye(4), ValueError, "does not begin at a multiple"),
+        (np.frombuffer(bytearray(17), np.int16, 8, 1).reshape(2, 2, 2), np.eye(4), ValueError, "is not aligned to the size"),
         (np.full((2, 2, 2), np.nan, np.float32), np.eye(4), ValueError, "voxel (0, 0, 0) holds a value that is not a number"),
         (np.zeros((2, 2, 2), np.int16), np.eye(3), ValueError, "affine has the shape (3, 3), expected (4, 4)"),
         (np.zeros((2, 2, 2), np.int16), np.full((4, 4), np.nan), ValueError, "affine contains NaN"),

@@ -133,11 +133,11 @@ fn what_makes_no_phantom_is_refused_before_anything_is_written() {
         ),
         (
             "ct phantom --spacing-mm 8 --out a.nii --labels a.nii",
-            "two files",
+            "two different files",
         ),
         (
             "ct phantom --spacing-mm 8 --out a.nii --labels ./a.nii",
-            "two files",
+            "two different files",
         ),
         (
             "ct phantom --spacing-mm 8 --out a.nii --labels bones",

@@ -187,7 +187,7 @@ fn a_task_of_an_array_that_runs_again_keeps_its_shard() {
     let refused = run("shard_2");
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(
-        !refused.status.success() && said.contains("open; give --shard"),
+        !refused.status.success() && said.contains("does not determine the shard; give --shard"),
         "{said}"
     );
     assert!(!folder.path().join("shard_2").exists());

@@ -35,8 +35,7 @@ fn poses_and_outliers_are_those_of_the_quality_report() {
     assert_eq!(odd["stands_out"], json!(["height of the joint"]));
     let report = qa_page(&browser.case).unwrap();
     let height = odd["height_mm"].as_f64().unwrap();
-    let sentence =
-        format!("orig, 15.0 degrees: height of the joint {height:.2} mm does not follow");
+    let sentence = format!("orig, 15.0 degrees: height of the joint {height:.2} mm does not fit");
     assert!(report.contains(&sentence), "{sentence}");
     let labels: Vec<f64> = poses
         .iter()

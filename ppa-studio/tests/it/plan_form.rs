@@ -224,7 +224,7 @@ fn limbs_are_added_from_the_folder_and_removed() {
         ),
         (
             json!({ "patient": { "number": 2, "patient": 4 } }),
-            "p01.case.toml is the right limb of patient 4 already",
+            "p01.case.toml is already the right limb of patient 4",
         ),
     ] {
         let answer = change(wrong);

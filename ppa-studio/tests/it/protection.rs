@@ -31,7 +31,7 @@ fn other_hosts_and_other_pages_are_refused() {
     crossed.headers_mut().insert("origin", evil);
     silent.headers_mut().remove("origin");
     for (request, why) in [
-        (rebound, "not by another name"),
+        (rebound, "not via another host name"),
         (crossed, "other pages"),
         (silent, "page itself"),
     ] {
