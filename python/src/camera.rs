@@ -14,15 +14,15 @@ use crate::errors::OrRaise;
 use crate::scene::Scene;
 use crate::values::{from_table, plain, table};
 
-/// A depth camera and where it stands in the room.
+/// A depth camera and its pose in the room.
 ///
 /// Parameters
 /// ----------
 /// room_from_camera : array_like, shape (4, 4)
-///     Rigid motion from the camera's frame (x right, y down, z forward) to the room, mm.
+///     Rigid transform from the camera frame (x right, y down, z forward) to the room, mm.
 /// lens : dict or path, optional
-///     Keys of a camera JSON, or a calibration file of a device: Azure Kinect, Orbbec, OpenCV YAML, or a camera JSON. An Azure
-///     Kinect in its narrow unbinned mode by default.
+///     Keys of a camera JSON, or a calibration file: Azure Kinect, Orbbec, OpenCV YAML, or a camera JSON. By default, an Azure
+///     Kinect in its narrow unbinned mode.
 #[pyclass(frozen, module = "ppa", name = "Camera")]
 #[derive(Clone)]
 pub struct PyCamera {
@@ -58,7 +58,7 @@ impl PyCamera {
 }
 
 impl PyCamera {
-    /// The camera before the furniture of a scene.
+    /// The camera in a scene, with the furniture that it sees.
     pub fn placed(
         self,
         scene: &Scene,

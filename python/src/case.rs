@@ -23,10 +23,10 @@ use crate::side::letter;
 use crate::values::plain;
 use crate::volume::PyVolume;
 
-/// One limb of one CT, ready to be placed: what ``case.toml`` records, and what follows from it.
+/// One limb of one CT, ready to be placed: the contents of ``case.toml`` and what is computed from them.
 ///
-/// Made by :func:`prepare` or :meth:`Case.read`. Setting :attr:`joint`, :attr:`axis`, :attr:`anterior` or :attr:`plane` finds the rest
-/// again.
+/// Created by :func:`prepare` or :meth:`Case.read`. Setting :attr:`joint`, :attr:`axis`, :attr:`anterior` or :attr:`plane` recomputes
+/// the rest.
 #[pyclass(frozen, module = "ppa", name = "Case")]
 pub struct PyCase {
     limb: Mutex<Arc<PosableCase>>,
@@ -43,12 +43,12 @@ impl PyCase {
         self.limb.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The limb as it is now.
+    /// The current limb.
     pub fn limb(&self) -> Arc<PosableCase> {
         self.held().clone()
     }
 
-    /// Finds the limb again with other choices.
+    /// Prepares the limb again with changed choices.
     fn choose(&self, py: Python<'_>, change: impl FnOnce(&mut LandmarkOverrides)) -> PyResult<()> {
         let limb = self.limb();
         let mut choices = limb.case.choices.clone();
@@ -80,7 +80,7 @@ impl PyCase {
 
 #[pymethods]
 impl PyCase {
-    /// Read ``case.toml`` and find its limb in the scan.
+    /// Read ``case.toml`` and extract its limb from the scan.
     ///
     /// Parameters
     /// ----------
@@ -103,7 +103,7 @@ impl PyCase {
         Self::of(limb.or_raise()?)
     }
 
-    /// Write ``case.toml``; a file that is there is replaced.
+    /// Write ``case.toml``; an existing file is replaced.
     ///
     /// Parameters
     /// ----------
@@ -112,7 +112,7 @@ impl PyCase {
     /// Raises
     /// ------
     /// ValueError
-    ///     If the scan lies in no file: a case names one.
+    ///     If the scan was not read from a file, since a case names its file.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let limb = self.limb();
         if !limb.is_of_file() {
@@ -123,7 +123,7 @@ impl PyCase {
         limb.case.write(&path).or_raise()
     }
 
-    /// Write the skin, ct frame: .ply, .obj or .stl.
+    /// Write the skin in the ct frame as .ply, .obj or .stl.
     fn save_skin(&self, path: PathBuf) -> PyResult<()> {
         write_mesh_file(&path, &self.limb().prepared.limb.mesh).or_raise()
     }
@@ -151,7 +151,7 @@ impl PyCase {
         of_rows(py, vertices.map(|p| [p.x, p.y, p.z]).collect())
     }
 
-    /// numpy.ndarray, shape (n, 3), float32: unit normals of the skin at its vertices, outward.
+    /// numpy.ndarray, shape (n, 3), float32: outward unit normals of the skin at its vertices.
     #[getter]
     fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let limb = self.limb();
@@ -159,13 +159,13 @@ impl PyCase {
         of_rows(py, normals.map(|n| [n.x, n.y, n.z]).collect())
     }
 
-    /// numpy.ndarray, shape (m, 3), uint32: vertices of each triangle of the skin.
+    /// numpy.ndarray, shape (m, 3), uint32: vertex indices of each triangle of the skin.
     #[getter]
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         of_rows(py, self.limb().prepared.limb.mesh.triangles.clone())
     }
 
-    /// numpy.ndarray, shape (3,): centre of the joint, ct frame, mm. Setting it finds axis and plane again.
+    /// numpy.ndarray, shape (3,): centre of the joint, ct frame, mm. Setting it recomputes axis and plane.
     #[getter]
     fn joint<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.limb().prepared.landmarks.joint_centre)
@@ -177,9 +177,9 @@ impl PyCase {
         self.choose(joint.py(), |choices| choices.joint_centre = Some(centre))
     }
 
-    /// numpy.ndarray, shape (2, 3): a point of the axis, and one 100 mm farther towards proximal, ct frame, mm.
+    /// numpy.ndarray, shape (2, 3): two points of the axis, the second 100 mm proximal to the first, ct frame, mm.
     ///
-    /// Setting two points of an axis finds joint and plane again.
+    /// Setting two points of an axis recomputes joint and plane.
     #[getter]
     fn axis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let limb = self.limb();
@@ -203,7 +203,7 @@ impl PyCase {
         })
     }
 
-    /// numpy.ndarray, shape (3,): direction that faces up at angle 0, ct frame. Setting it finds the plane again.
+    /// numpy.ndarray, shape (3,): direction that faces up at angle 0, ct frame. Setting it recomputes the plane.
     #[getter]
     fn anterior<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.limb().prepared.landmarks.anterior)
@@ -230,39 +230,39 @@ impl PyCase {
         })
     }
 
-    /// dict: all landmarks, as ``[found.landmarks]`` of case.toml.
+    /// dict: all landmarks, as in ``[found.landmarks]`` of case.toml.
     #[getter]
     fn landmarks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plain(py, &self.limb().prepared.landmarks)
     }
 
-    /// list of dict: doubts about scan and limb, severe ones first.
+    /// list of dict: possible problems with scan and limb, severe ones first.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plain(py, &self.limb().prepared.findings)
     }
 
-    /// dict: the file that labels the bones, ``path``, ``numbers`` and whether it was ``segmented`` here; None without.
+    /// dict or None: ``path`` of the bone segmentation, ``numbers`` of the bones, and whether ppa ``segmented`` the scan.
     #[getter]
     fn bones<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plain(py, &self.limb().case.bones)
     }
 
-    /// numpy.ndarray, shape (4, 4): from the scan to the patient frame, T^P_CT, mm.
+    /// numpy.ndarray, shape (4, 4): transform from the scan to the patient frame, T^P_CT, mm.
     #[getter]
     fn patient_from_ct<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let motion = self.limb().prepared.landmarks.patient_from_ct();
         crate::volume::rows(py, motion.to_homogeneous_rows())
     }
 
-    /// Lay the limb on the table.
+    /// Place the limb on the table.
     ///
     /// Parameters
     /// ----------
     /// angle : float
     ///     Medial rotation, degrees.
     /// scene : Scene, optional
-    ///     The built-in room with the paper's settings by default.
+    ///     By default, the built-in room with the paper's settings.
     /// threads : int, optional
     ///     Worker threads; one per core by default.
     ///
@@ -281,7 +281,7 @@ impl PyCase {
         PyPose::new(py, self.limb(), angle, given, threads)
     }
 
-    /// Draw skin, axis, joint and plane with matplotlib, on axes that are given or in a new figure, which are returned.
+    /// Draw skin, axis, joint and plane with matplotlib on ``ax`` or in a new figure, and return the axes.
     #[pyo3(signature = (ax=None))]
     fn plot<'py>(
         this: &Bound<'py, Self>,

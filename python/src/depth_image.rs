@@ -1,4 +1,4 @@
-//! `ppa.DepthImage`: depths of one camera.
+//! `ppa.DepthImage`: depth image of one camera.
 
 use std::path::PathBuf;
 
@@ -13,12 +13,12 @@ use crate::arrays::{converted, device, exported, of_rows, view};
 use crate::errors::OrRaise;
 use crate::values::plain;
 
-/// Depths in mm, z of the camera's frame; 0 where nothing is seen.
+/// Depth image: z in the camera frame, mm; 0 where nothing is seen.
 #[pyclass(frozen, module = "ppa", name = "DepthImage")]
 pub struct PyDepthImage {
     pub image: DepthImage,
     pub camera: Camera,
-    /// Square around the joint; None where the camera does not see it.
+    /// Square around the joint; None if the joint is outside the image.
     pub roi: Option<Roi>,
 }
 
@@ -35,36 +35,36 @@ impl PyDepthImage {
     #[allow(unsafe_code)]
     fn z_mm<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let image = this.get();
-        // SAFETY: the image is never changed, and stays where it is in its frozen object.
+        // SAFETY: the image is never changed or moved within its frozen object.
         unsafe { view(this.clone().into_any(), &image.image.z_mm, image.shape()) }
     }
 
-    /// numpy.ndarray, shape (rows, columns), uint16: depths in whole mm, as PNG files hold them.
+    /// numpy.ndarray, shape (rows, columns), uint16: depths in whole mm, as in PNG files.
     fn to_uint16<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u16>>> {
         let whole = self.image.to_u16();
         whole.z_mm.into_pyarray(py).reshape(self.shape())
     }
 
-    /// numpy.ndarray, shape (n, 3): the points that are seen, in the camera's frame, mm.
+    /// numpy.ndarray, shape (n, 3): visible points in the camera frame, mm.
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = self.image.points(&self.camera).or_raise()?;
         of_rows(py, points.iter().map(|p| [p.x, p.y, p.z]).collect())
     }
 
-    /// dict: the lens of the camera, as its JSON.
+    /// dict: lens of the camera, with the keys of the camera JSON.
     #[getter]
     fn lens<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plain(py, self.camera.spec())
     }
 
     /// (int, int, int) or None: square around the joint that networks see: first column, first row and size in pixels, as in
-    /// ``roi_depth.json``; None where the joint is not on the image.
+    /// ``roi_depth.json``; None if the joint is outside the image.
     #[getter]
     fn roi(&self) -> Option<(u32, u32, u32)> {
         self.roi.map(|roi| (roi.x_start, roi.y_start, roi.size))
     }
 
-    /// Write the image: 16-bit PNG in mm, OpenEXR, or the points that are seen as PLY. A file that is there is replaced.
+    /// Write the image as 16-bit PNG in mm or OpenEXR, or its visible points as PLY. An existing file is replaced.
     ///
     /// Parameters
     /// ----------
@@ -85,12 +85,12 @@ impl PyDepthImage {
         }
     }
 
-    /// Write the image in false colour, near red, far blue, as PNG; a file that is there is replaced.
+    /// Write the image in false colour (near red, far blue) as PNG; an existing file is replaced.
     fn save_preview(&self, path: PathBuf) -> PyResult<()> {
         self.image.write_preview(&path).or_raise()
     }
 
-    /// Draw the image with matplotlib, on axes that are given or in a new figure, which are returned.
+    /// Draw the image with matplotlib on ``ax`` or in a new figure, and return the axes.
     #[pyo3(signature = (ax=None))]
     fn plot<'py>(
         this: &Bound<'py, Self>,

@@ -15,7 +15,7 @@ use crate::plan::plan_of;
 use crate::progress::observer;
 use crate::values::plain;
 
-/// Poses of a run: all of them, and those that are there.
+/// Poses of a run: total and finished.
 #[derive(Default)]
 struct Counts {
     total: AtomicUsize,
@@ -23,7 +23,7 @@ struct Counts {
 }
 
 impl Counts {
-    /// Counts on and reports. Whether to go on is what the flag says that the run looks at.
+    /// Updates the counts and reports them. The run itself reads the stop flag.
     fn report(&self, progress: Progress, watch: &Watch) -> ControlFlow<()> {
         match progress {
             Progress::Findings(_) => return ControlFlow::Continue(()),
@@ -37,26 +37,26 @@ impl Counts {
     }
 }
 
-/// Make what is missing of a plan's dataset; resumes where an earlier run ended.
+/// Generate the missing poses of a plan's dataset; resumes an interrupted run.
 ///
-/// Ctrl-C ends the call within a second; poses that are being made then are finished beside the program, and the next call resumes.
+/// Ctrl-C ends the call within a second; poses in progress are finished in the background, and the next call resumes.
 ///
 /// Parameters
 /// ----------
 /// plan : Plan or path of plan.toml
-///     What to make.
+///     Plan of the dataset.
 /// out : str or os.PathLike
 ///     Folder of the dataset.
 /// seed : int, optional
-///     In place of the plan's.
+///     Replaces the plan's seed.
 /// shard : str, optional
-///     Make only shard k of n, as "2/7", in a folder of its own.
+///     Generate only shard k of n, e.g. "2/7"; each shard needs a separate folder.
 /// replace : bool
-///     Replace what differs from the plan; old images stay until the new ones are complete.
+///     Replace poses that differ from the plan; old images are kept until the new ones are complete.
 /// disk_limit : int, optional
-///     Stop before the images take more than this, bytes.
+///     Stop before the images exceed this size in bytes.
 /// progress : bool or callable, optional
-///     True for a bar of tqdm, or a function of done and total poses.
+///     True for a tqdm progress bar, or a function of done and total poses.
 /// threads : int, optional
 ///     Worker threads; one per core by default. The images do not depend on it.
 ///
