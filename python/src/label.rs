@@ -22,7 +22,7 @@ use crate::plan::plan_of;
 use crate::progress::observer;
 use crate::values::{from_table, plain, table};
 
-/// A scale by its name, with thresholds of a dictionary or a TOML file in place of its own.
+/// A scale by name, with its default thresholds or those of a dictionary or TOML file.
 pub fn scale_of(name: &str, thresholds: Option<&Bound<'_, PyAny>>) -> PyResult<LabelScale> {
     let name: ScaleName = name.parse().or_raise()?;
     let Some(given) = thresholds else {
@@ -58,14 +58,14 @@ enum LabelError {
     Interrupted,
 }
 
-/// What the command line prints as JSON.
+/// The JSON output of the command line.
 #[derive(Serialize)]
 struct Labelled {
     limbs: Vec<LabelledLimb>,
     thresholds: LabelScale,
 }
 
-/// Labels of all limbs of a plan, or of none.
+/// Labels all limbs of a plan, or none.
 struct Labelling {
     dataset: PathBuf,
     plan: Plan,
@@ -113,34 +113,35 @@ impl Labelling {
     }
 }
 
-/// Compute labels of a dataset from the bones of its cases, and write them beside its images, as ``ppa label auto`` does.
+/// Compute the labels of a dataset from the bones of its cases and write them into its folder, like ``ppa label auto``.
 ///
-/// No reader has confirmed these labels. Those of readers stay; an interrupted call writes nothing.
+/// No reader has validated these labels. Readers' labels are kept; an interrupted call writes nothing.
 ///
 /// Parameters
 /// ----------
 /// dataset : str or os.PathLike
 ///     Folder of the dataset.
 /// plan : Plan or path of plan.toml, optional
-///     What the dataset was made from; the file beside the folder that is named after it by default. Its cases name the bones
-///     (``bones`` or ``segment_bones`` of :func:`prepare`).
+///     Plan of the dataset; by default the file next to its folder, named after it. Its cases name the bones (``bones`` or
+///     ``segment_bones`` of :func:`prepare`).
 /// scale : {"graded", "strict"}
-///     By how far the malleoli hide the gutters, as wide as readers' grades; or by how open the worst gutter is.
+///     "graded" grades how far the malleoli cover the gutters, with a diagnostic range fitted to readers; "strict" grades how open
+///     the worst gutter is.
 /// name : str, optional
 ///     Write labels.NAME.json and leave labels.json as it is.
 /// thresholds : dict or path of a TOML file, optional
-///     In place of the scale's own: ``hidden_mm`` and ``lost_contrast`` (graded), ``relative_to`` and ``at_least`` (strict).
+///     Thresholds of the scale: ``hidden_mm`` and ``lost_contrast`` (graded), ``relative_to`` and ``at_least`` (strict).
 /// replace : bool
 ///     Replace computed labels that differ.
 /// progress : bool or callable, optional
-///     True for a bar of tqdm, or a function of done and total limbs.
+///     True for a tqdm progress bar, or a function of done and total limbs.
 /// threads : int, optional
 ///     Worker threads; one per core by default.
 ///
 /// Returns
 /// -------
 /// dict
-///     ``limbs``, each with the number of its ``radiographs``, how many are ``diagnostic``, and its ``best_angle_deg``; and
+///     ``limbs``, each with its number of ``radiographs``, the number of ``diagnostic`` ones and its ``best_angle_deg``; and
 ///     ``thresholds``.
 #[pyfunction]
 #[pyo3(signature = (dataset, plan=None, *, scale="graded", name=None, thresholds=None, replace=false, progress=None, threads=None))]

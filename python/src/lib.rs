@@ -1,4 +1,4 @@
-//! The compiled module of the Python package `ppa`: arguments in, calls of the crates, arrays out.
+//! The compiled module of the Python package `ppa`: converts arguments, calls the crates and returns arrays.
 
 mod arguments;
 mod arrays;

@@ -1,4 +1,4 @@
-//! `ppa.Material`: what a gram of matter does to photons.
+//! `ppa.Material`: photon cross sections of materials.
 
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use ppa_xray::{CrossSections, Material};
@@ -27,16 +27,16 @@ impl PyMaterial {
         })
     }
 
-    /// A material by its composition.
+    /// Create a material from its composition.
     ///
     /// Parameters
     /// ----------
     /// name : str
-    ///     Any name.
+    ///     Freely chosen name.
     /// density_g_cm3 : float
     ///     Density, g/cm³.
     /// composition : str
-    ///     Mass fractions by element, as "Ca:0.4,C:0.12,O:0.48".
+    ///     Mass fractions by element, e.g. "Ca:0.4,C:0.12,O:0.48".
     #[staticmethod]
     fn compound(name: &str, density_g_cm3: f64, composition: &str) -> PyResult<Self> {
         let material = Material::parse_composition(name, density_g_cm3, composition);
@@ -51,7 +51,7 @@ impl PyMaterial {
         Material::names().collect()
     }
 
-    /// The name.
+    /// Name of the material.
     #[getter]
     fn name(&self) -> &str {
         self.material.name()
@@ -69,7 +69,7 @@ impl PyMaterial {
         self.material.composition()
     }
 
-    /// Mass attenuation by the photoelectric effect, cm²/g.
+    /// Mass attenuation coefficient of the photoelectric effect, cm²/g.
     ///
     /// Parameters
     /// ----------
@@ -83,17 +83,17 @@ impl PyMaterial {
         self.at(energy_kev, |sections| sections.photoelectric)
     }
 
-    /// Mass attenuation by Rayleigh scattering, cm²/g; as :meth:`photoelectric_cm2_g`.
+    /// Mass attenuation coefficient of Rayleigh scattering, cm²/g; see :meth:`photoelectric_cm2_g`.
     fn rayleigh_cm2_g<'py>(&self, energy_kev: &Bound<'py, PyAny>) -> Attenuation<'py> {
         self.at(energy_kev, |sections| sections.rayleigh)
     }
 
-    /// Mass attenuation by Compton scattering, cm²/g; as :meth:`photoelectric_cm2_g`.
+    /// Mass attenuation coefficient of Compton scattering, cm²/g; see :meth:`photoelectric_cm2_g`.
     fn compton_cm2_g<'py>(&self, energy_kev: &Bound<'py, PyAny>) -> Attenuation<'py> {
         self.at(energy_kev, |sections| sections.compton)
     }
 
-    /// Mass attenuation, cm²/g; as :meth:`photoelectric_cm2_g`.
+    /// Total mass attenuation coefficient, cm²/g; see :meth:`photoelectric_cm2_g`.
     fn total_cm2_g<'py>(&self, energy_kev: &Bound<'py, PyAny>) -> Attenuation<'py> {
         self.at(energy_kev, |sections| sections.total())
     }

@@ -10,20 +10,20 @@ use crate::background::run;
 use crate::errors::OrRaise;
 use crate::values::plain;
 
-/// Metrics of predictions against labels, as in the paper.
+/// Compute the paper's metrics of predictions.
 ///
 /// Parameters
 /// ----------
 /// labels : array_like, shape (n,)
 ///     Quality from 1 (ideal) to 3 (inadequate).
 /// predictions : array_like, shape (n,)
-///     What a network says.
+///     Predicted quality.
 ///
 /// Returns
 /// -------
 /// dict
 ///     ``n``, ``mse``, ``mae``, ``spearman``, ``accuracy``, ``diagnostic_accuracy``, ``sensitivity`` and ``specificity``; None
-///     where a metric is not defined. ``constant_prediction`` where predictions hardly differ.
+///     if a metric is not defined. ``constant_prediction`` is not None if the predictions hardly differ.
 #[pyfunction]
 pub fn evaluate<'py>(
     py: Python<'py>,
@@ -38,14 +38,14 @@ pub fn evaluate<'py>(
     )
 }
 
-/// Exact paired sign-flip permutation test of the mean difference a - b.
+/// Run the exact paired sign-flip permutation test of the mean difference a - b.
 ///
 /// Parameters
 /// ----------
 /// a, b : array_like, shape (n,)
-///     Pairs.
+///     Paired values.
 /// seeds : array_like of int, shape (n,), optional
-///     Seed of each pair: the pairs of a seed (its folds) are averaged first.
+///     Seed of each pair; the pairs of each seed (its folds) are averaged first.
 /// threads : int, optional
 ///     Worker threads; one per core by default.
 ///

@@ -1,4 +1,4 @@
-//! `ppa.Network`: a finished training that judges depth images.
+//! `ppa.Network`: trained networks that predict the quality of a pose from depth images.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,19 +18,19 @@ use crate::depth_image::PyDepthImage;
 use crate::errors::{OrRaise, PpaError};
 use crate::values::plain;
 
-/// Networks of finished trainings that judge pairs of depth images. Made by :meth:`Network.load`.
+/// Trained networks that predict the quality of a pose from a pair of depth images. Created by :meth:`Network.load`.
 #[pyclass(frozen, module = "ppa", name = "Network")]
 pub struct PyNetwork {
     predictor: Arc<PairPredictor>,
 }
 
-/// What a network looks at: the depths of an image, mm, and a square of them.
+/// Input of a network: a depth image, mm, and a square region in it.
 struct Seen {
     depths: Raster<u16>,
     region: Roi,
 }
 
-/// An image with the square given, its own one around the joint, or all of a square image.
+/// An image with the given square, its own square around the joint, or the whole of a square image.
 fn seen(object: &Bound<'_, PyAny>, roi: Option<[u32; 3]>, name: &str) -> PyResult<Seen> {
     let depths = depths(object, name)?;
     let given = roi.map(|[x_start, y_start, size]| Roi {
@@ -88,15 +88,15 @@ impl PyNetwork {
     /// Parameters
     /// ----------
     /// left : str or os.PathLike
-    ///     Folder of the training of the left camera's network, or of one that takes the images of either or of both cameras.
+    ///     Folder of the finished training of the left camera's network, or of a network for either or both cameras' images.
     /// right : str or os.PathLike, optional
-    ///     Folder of the right camera's network.
+    ///     Folder of the finished training of the right camera's network.
     /// side : {"r", "l"}, optional
-    ///     Side of the limb: needed by networks that were trained with ``mirror = true``.
+    ///     Side of the limb; required for networks trained with ``mirror = true``.
     /// confidence : str or os.PathLike, optional
-    ///     File of ``ppa calibrate`` for the same networks: adds intervals, and refuses images unlike the training images.
+    ///     File that ``ppa calibrate`` wrote for the same networks: adds intervals, and refuses images unlike the training images.
     /// device : str
-    ///     Where the networks compute.
+    ///     Device to run the networks on.
     ///
     /// Returns
     /// -------
@@ -113,7 +113,7 @@ impl PyNetwork {
     ) -> PyResult<Self> {
         let side = side.map(crate::side::side).transpose()?;
         let device: DeviceName = device.parse().or_raise()?;
-        // Replaced by those of each call.
+        // Each call replaces them.
         let regions = [0, 1].map(|_| Roi {
             x_start: 0,
             y_start: 0,
@@ -135,23 +135,23 @@ impl PyNetwork {
         })
     }
 
-    /// Judge a pair of depth images.
+    /// Predict the quality of a pose from a pair of depth images.
     ///
     /// Parameters
     /// ----------
     /// depth_left, depth_right : DepthImage or numpy.ndarray, shape (rows, columns), uint16
-    ///     Depths in mm, 0 where there is none.
+    ///     Depths in mm; 0 is invalid.
     /// roi_left, roi_right : (int, int, int), optional
     ///     Square around the joint: first column, first row and size, as in ``roi_depth.json``; by default that of the
-    ///     DepthImage (:attr:`DepthImage.roi`), or all of a square array.
+    ///     DepthImage (:attr:`DepthImage.roi`), or the whole of a square array.
     /// threads : int, optional
     ///     Worker threads; one per core by default.
     ///
     /// Returns
     /// -------
     /// dict
-    ///     ``quality`` from 1 (ideal) to 3 (inadequate); ``left`` and ``right``, unless one network judges both images; and
-    ///     ``correction_deg``, ``interval`` and ``diagnostic`` where the networks have them.
+    ///     ``quality`` from 1 (ideal) to 3 (inadequate); ``left`` and ``right``, unless one network uses both images; and
+    ///     ``correction_deg``, ``interval`` and ``diagnostic`` if available.
     #[pyo3(signature = (depth_left, depth_right, *, roi_left=None, roi_right=None, threads=None))]
     fn predict<'py>(
         &self,

@@ -1,4 +1,4 @@
-//! `ppa.phantom`: a CT of a limb whose true shape is known.
+//! `ppa.phantom`: CT of a limb with a known shape.
 
 use ppa_core::Side;
 use ppa_ct::Volume;
@@ -12,7 +12,7 @@ use crate::errors::OrRaise;
 use crate::values::plain;
 use crate::volume::PyVolume;
 
-/// A lower leg of the table, or drawn by a seed.
+/// A built-in lower leg, or a random one.
 fn lower_leg(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult<LowerLeg> {
     let leg = match seed {
         Some(seed) => LowerLeg::from_seed(seed, side),
@@ -35,22 +35,22 @@ fn limb(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult<Limb
     }
 }
 
-/// A CT of a limb made of shapes, not of a person.
+/// Create the CT of a limb phantom.
 ///
 /// Parameters
 /// ----------
 /// name : str
-///     Lower leg of the table, "P01" to "P17", or "knee".
+///     Built-in lower leg, "P01" to "P17", or "knee".
 /// side : {"r", "l"}
 ///     Side of the body.
 /// seed : int, optional
-///     Lower leg drawn by this seed, instead of one of the table.
+///     Draw a random lower leg from this seed instead.
 /// plate : bool
-///     A titanium plate with five screws on the fibula.
+///     Put a titanium plate with five screws on the fibula.
 /// spacing_mm : float
-///     Side of the cubic voxels.
+///     Side of the cubic voxels, mm.
 /// table : bool
-///     Let the limb lie on a table top.
+///     Place the limb on a table top.
 /// blur_mm : float
 ///     Blur of a scanner: full width at half maximum, mm.
 /// noise_hu : float
@@ -102,12 +102,12 @@ pub fn phantom(
     })
 }
 
-/// Which bone of a phantom each voxel of a volume belongs to, for ``bones`` of :func:`prepare`.
+/// Create the label volume of a phantom's bones, for ``bones`` of :func:`prepare`.
 ///
 /// Parameters
 /// ----------
 /// volume : Volume
-///     The lattice: a CT of the same phantom.
+///     CT of the same phantom, which defines the voxel grid.
 /// name, side, seed
 ///     As for :func:`phantom`.
 /// threads : int, optional
@@ -116,7 +116,7 @@ pub fn phantom(
 /// Returns
 /// -------
 /// Volume
-///     0 for none; of a lower leg 3 is the tibia, 4 the fibula and 1 the talus.
+///     0 outside the bones; in a lower leg, 3 is the tibia, 4 the fibula and 1 the talus.
 #[pyfunction]
 #[pyo3(signature = (volume, name="P01", side="r", *, seed=None, threads=None))]
 pub fn phantom_bones(
@@ -139,7 +139,7 @@ pub fn phantom_bones(
     })
 }
 
-/// What a measurement on a phantom's lower leg should find: frame ct (LPS), mm and radians.
+/// True landmarks and dimensions of a lower-leg phantom: ct frame (LPS), mm and radians.
 ///
 /// Parameters
 /// ----------

@@ -1,4 +1,4 @@
-//! `ppa.Plan`: the settings of a dataset, and of single images.
+//! `ppa.Plan`: settings of a dataset or of single images.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,30 +13,30 @@ use crate::arguments::whole;
 use crate::errors::{OrRaise, PpaError};
 use crate::values::{dictionary, from_table, table, to_table};
 
-/// Everything that a dataset is made of: the keys of plan.toml.
+/// Settings of a dataset: the keys of plan.toml.
 ///
 /// Parameters
 /// ----------
 /// cases : sequence of (path, int)
 ///     Case files with the number N of each person's folder ``patient_N``.
 /// seed : int
-///     Everything random follows from it.
+///     Seed of all random numbers.
 /// technique : {"ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbow"}, optional
-///     Usual exposure of an examination; keys of ``xray`` replace its values.
+///     Typical exposure of an examination; keys of ``xray`` replace its values.
 /// rotation, shapes, soft_tissue, positioning, room, depth, xray : dict, optional
-///     The tables of plan.toml, e.g. ``rotation={"from_deg": 0, "to_deg": 30, "step_deg": 5}``. A key that is left out has its default;
-///     paths start at the current folder.
+///     The tables of plan.toml, e.g. ``rotation={"from_deg": 0, "to_deg": 30, "step_deg": 5}``. Omitted keys have their defaults;
+///     relative paths start at the current folder.
 ///
 /// Raises
 /// ------
 /// PpaError
-///     A key that does not exist, or a value that cannot work.
+///     If a key is unknown or a value is invalid.
 #[pyclass(frozen, module = "ppa", name = "Plan")]
 pub struct PyPlan {
     pub plan: Arc<Plan>,
 }
 
-/// Settings of radiographs: `base`, or a technique with the rest of `base`, and the keys of a dictionary in place of its values.
+/// Settings of radiographs: `base`, changed by a technique and then by the keys of a dictionary.
 pub fn xray_settings(
     base: &XraySettings,
     technique: Option<&str>,
@@ -123,7 +123,7 @@ impl PyPlan {
         })
     }
 
-    /// Write plan.toml; a file that is there is replaced.
+    /// Write plan.toml; an existing file is replaced.
     ///
     /// Parameters
     /// ----------
@@ -146,7 +146,7 @@ impl PyPlan {
     }
 }
 
-/// A plan from an object, from a file that is named, or the default one.
+/// A plan from an object or from the file at a path; the default plan if neither is given.
 pub fn plan_of(object: Option<&Bound<'_, PyAny>>) -> PyResult<Arc<Plan>> {
     let Some(object) = object else {
         return Ok(Arc::new(Plan::new(Vec::new())));

@@ -1,4 +1,4 @@
-//! A case with its scan and its limb, as objects of Python share it.
+//! A case with its scan and its limb, shared by Python objects.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -13,9 +13,9 @@ pub struct PosableCase {
     pub case: Case,
     pub scan: Scan,
     pub prepared: Arc<PreparedLimb>,
-    /// The limb before the x-ray device of the last scene.
+    /// The limb, ready for exposure in the last scene.
     exposable: Mutex<Option<(Arc<Scene>, ExposableLimb)>>,
-    /// The joint space between the bones, once a label was asked for.
+    /// The joint space between the bones, computed for the first label.
     joint_space: Mutex<Option<Arc<JointSpace>>>,
 }
 
@@ -30,7 +30,7 @@ impl PosableCase {
         }
     }
 
-    /// The limb before the x-ray device of a scene, kept for the next exposure.
+    /// The limb, ready for exposure in a scene; kept for the next exposure.
     pub fn exposable(&self, scene: &Arc<Scene>) -> Result<ExposableLimb, ExposableError> {
         if let Some((of, limb)) = &*held(&self.exposable)
             && Arc::ptr_eq(of, scene)
@@ -58,13 +58,13 @@ impl PosableCase {
         Ok(space)
     }
 
-    /// Whether the scan of the case lies in a file.
+    /// Whether the scan of the case was read from a file.
     pub fn is_of_file(&self) -> bool {
         !self.case.source.path.as_os_str().is_empty()
     }
 }
 
-/// What is kept; not to be held while worker threads compute: one that waits for others may be handed another call on the same case.
+/// Locks what is kept. Do not hold the lock while worker threads compute: a waiting worker may take up another call on the same case.
 fn held<T>(kept: &Mutex<T>) -> MutexGuard<'_, T> {
     kept.lock().unwrap_or_else(PoisonError::into_inner)
 }

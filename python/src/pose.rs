@@ -1,4 +1,4 @@
-//! `ppa.Pose`: a limb on the table, and the images made of it.
+//! `ppa.Pose`: a limb on the table, and its images.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ use crate::scene::{Scene, frames};
 use crate::values::{plain, table};
 use crate::volume::rows;
 
-/// A limb as it lies on the table, turned medially by an angle. Made by :meth:`Case.place`.
+/// A limb on the table, rotated medially by an angle. Created by :meth:`Case.place`.
 #[pyclass(frozen, module = "ppa", name = "Pose")]
 pub struct PyPose {
     limb: Arc<PosableCase>,
@@ -59,7 +59,7 @@ fn sensor_of(sensor: &Bound<'_, PyAny>) -> PyResult<SensorSpec> {
     }
 }
 
-/// Which camera an image is made with.
+/// The camera of an image.
 enum Chosen {
     OfScene(View),
     Own(Box<PyCamera>),
@@ -102,13 +102,13 @@ impl PyPose {
         self.angle_deg
     }
 
-    /// numpy.ndarray, shape (4, 4): from the patient frame to the room, T^ToF_P, mm.
+    /// numpy.ndarray, shape (4, 4): transform from the patient frame to the room, T^ToF_P, mm.
     #[getter]
     fn room_from_patient<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         rows(py, self.placement.room_from_patient.to_homogeneous_rows())
     }
 
-    /// numpy.ndarray, shape (4, 4): from the scan to the room, mm.
+    /// numpy.ndarray, shape (4, 4): transform from the scan to the room, mm.
     #[getter]
     fn room_from_ct<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let landmarks = &self.limb.prepared.landmarks;
@@ -116,7 +116,7 @@ impl PyPose {
         rows(py, motion.to_homogeneous_rows())
     }
 
-    /// dict of numpy.ndarray, shape (4, 4): rigid motions by name, ``target_from_source``, from the scan to the cameras, mm.
+    /// dict of numpy.ndarray, shape (4, 4): rigid transforms by name, ``target_from_source``, between scan, patient, room, device and cameras, mm.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rig = self.scene.plan.depth.cameras().or_raise()?;
@@ -140,7 +140,7 @@ impl PyPose {
         plain(py, &self.placement.contact)
     }
 
-    /// numpy.ndarray, shape (n, 3), float32: vertices of the skin in the room, mm; flattened where soft tissue gives way.
+    /// numpy.ndarray, shape (n, 3), float32: vertices of the skin in the room, mm; flattened where soft tissue is compressed.
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let prepared = &self.limb.prepared;
@@ -149,21 +149,21 @@ impl PyPose {
         of_rows(py, placed.iter().map(|p| [p.x, p.y, p.z]).collect())
     }
 
-    /// numpy.ndarray, shape (m, 3), uint32: vertices of each triangle of the skin.
+    /// numpy.ndarray, shape (m, 3), uint32: vertex indices of each triangle of the skin.
     #[getter]
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         of_rows(py, self.limb.prepared.limb.mesh.triangles.clone())
     }
 
-    /// Depth image of the limb in the room.
+    /// Simulate a depth image of the limb in the room.
     ///
     /// Parameters
     /// ----------
     /// camera : {"left", "right"} or Camera
-    ///     A camera of the scene, or another one.
+    ///     A camera of the scene, by default the left one, or another camera.
     /// sensor : "default" or dict, optional
-    ///     Errors of the sensor, as ``[depth.sensor]`` of plan.toml; those of the scene by default, whose own default is an ideal
-    ///     image.
+    ///     Errors of the sensor, as in ``[depth.sensor]`` of plan.toml; by default those of the scene. A scene without sensor errors
+    ///     gives ideal images.
     /// seed : int
     ///     Seed of the sensor's noise.
     /// threads : int, optional
@@ -221,35 +221,35 @@ impl PyPose {
         image.or_raise()
     }
 
-    /// Radiograph of the limb.
+    /// Simulate a radiograph of the limb.
     ///
     /// Parameters
     /// ----------
     /// tube : dict, optional
     ///     ``kvp``, ``filters`` and ``anode_angle_deg``.
     /// technique : {"ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbow"}, optional
-    ///     Usual exposure of an examination: tube voltage and load, focal spot, collimation, CsI detector.
+    ///     Typical exposure of an examination: tube voltage and load, focal spot, collimation, CsI detector.
     /// xray : dict, optional
-    ///     Further keys of ``[xray]`` of plan.toml, in place of those of scene and technique.
+    ///     Keys of ``[xray]`` of plan.toml that replace those of the scene and the technique.
     /// engine : {"fast", "analog"}
     ///     Ray-traced primary with Monte Carlo scatter and added noise, or analog Monte Carlo.
     /// histories : float, optional
-    ///     Photons followed (analog, 2e7 by default), or whose noise the image carries (fast, 2e10; ``math.inf`` for the expected
-    ///     image).
+    ///     Photons to follow (analog; 2e7 by default unless ``target_error`` or ``seconds`` is given), or whose noise the image has
+    ///     (fast; 2e10 by default, ``math.inf`` for the expected image).
     /// mas : float, optional
-    ///     Tube load, mAs, in place of histories; fast engine.
+    ///     Fast engine: tube load in mAs, instead of ``histories``.
     /// exposure_index : float, optional
-    ///     Automatic exposure control: tube load that gives this exposure index; fast engine.
+    ///     Fast engine: automatic exposure control, with the tube load that gives this exposure index.
     /// target_error : float, optional
     ///     Analog engine: stop when half of the pixels have a relative standard error below this, e.g. 0.02.
     /// seconds : float, optional
     ///     Analog engine: stop after this time.
     /// dose : bool or "map"
-    ///     Analog engine: count energy imparted and air kerma; with "map" the dose of each voxel as well.
+    ///     Analog engine: score energy imparted and air kerma; with "map", also the dose of each voxel.
     /// seed : int
     ///     Seed of histories and noise.
     /// progress : bool or callable, optional
-    ///     True for a bar of tqdm, or a function of done and total.
+    ///     True for a tqdm progress bar, or a function of done and total.
     /// threads : int, optional
     ///     Worker threads; one per core by default. The image does not depend on it.
     ///
@@ -315,9 +315,9 @@ impl PyPose {
         Ok(PyRadiograph::new(made.or_raise()?))
     }
 
-    /// Grade how well a radiograph of the pose would show the joint space of the ankle, computed from the bones of the case.
+    /// Grade, from the bones of the case, how well a radiograph of the pose would show the joint space of the ankle.
     ///
-    /// No reader has confirmed these labels.
+    /// No reader has validated these labels.
     ///
     /// Parameters
     /// ----------
@@ -331,7 +331,7 @@ impl PyPose {
     /// Returns
     /// -------
     /// dict
-    ///     ``label`` from 1 (ideal) to 3 (inadequate), its ``std``, and ``gutters``: ``name``, ``openness`` and ``grade`` of each.
+    ///     ``label`` from 1 (ideal) to 3 (inadequate), its ``std``, and ``gutters``, each with ``name``, ``openness`` and ``grade``.
     #[pyo3(signature = (*, scale="graded", thresholds=None, threads=None))]
     fn label<'py>(
         &self,
@@ -353,7 +353,7 @@ impl PyPose {
         plain(py, &label.or_raise()?)
     }
 
-    /// Draw the limb in the room with matplotlib, on axes that are given or in a new figure, which are returned.
+    /// Draw the limb in the room with matplotlib on ``ax`` or in a new figure, and return the axes.
     #[pyo3(signature = (ax=None))]
     fn plot<'py>(
         this: &Bound<'py, Self>,

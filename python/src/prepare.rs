@@ -21,7 +21,7 @@ use crate::posable_case::PosableCase;
 use crate::values::word;
 use crate::volume::PyVolume;
 
-/// A scan without a file.
+/// A scan that was not read from a file.
 fn of_memory(volume: Volume) -> Scan {
     Scan {
         volume,
@@ -32,7 +32,7 @@ fn of_memory(volume: Volume) -> Scan {
     }
 }
 
-/// Why there is no case.
+/// Why a case cannot be prepared.
 #[derive(Debug, thiserror::Error)]
 enum PreparationError {
     #[error(transparent)]
@@ -47,7 +47,7 @@ enum PreparationError {
     Interrupted,
 }
 
-/// Bones of a file that a person or another program made.
+/// Bones in a file that a person or another program segmented.
 fn labelled(path: PathBuf, [tibia, fibula, talus]: [u8; 3]) -> BoneFile {
     BoneFile {
         path,
@@ -60,7 +60,7 @@ fn labelled(path: PathBuf, [tibia, fibula, talus]: [u8; 3]) -> BoneFile {
     }
 }
 
-/// Bones that are separated in the scan and written to `target`.
+/// Bones that are segmented in the scan and written to `target`.
 fn separated(target: PathBuf, scan: &Path, replace: bool) -> PyResult<BoneFile> {
     check_segmented_name(&target, scan).or_raise()?;
     if target.exists() && !replace {
@@ -76,7 +76,7 @@ fn separated(target: PathBuf, scan: &Path, replace: bool) -> PyResult<BoneFile> 
     })
 }
 
-/// A case that names its bones, once it is sure that labels can be computed from them.
+/// A case with its bones, after a check that labels can be computed from them.
 fn with_bones(
     case: Case,
     prepared: &PreparedLimb,
@@ -99,7 +99,7 @@ fn with_bones(
     })
 }
 
-/// Find skin, axis, joint and supporting plane of a limb.
+/// Find the skin, axis, joint and supporting plane of a limb.
 ///
 /// Parameters
 /// ----------
@@ -108,23 +108,23 @@ fn with_bones(
 /// side : {"r", "l"}
 ///     Side of the limb; if the scan shows two side by side, the one on this side of the patient is used.
 /// limb : {"lower_leg", "knee", "other"}, optional
-///     Kind of limb; a lower leg where an ankle is found, else a knee where one is.
+///     Kind of limb; by default a lower leg if an ankle is found, otherwise a knee if one is found.
 /// iso_hu : float
-///     Hounsfield units of the skin; -500 by default.
+///     CT number of the skin surface, HU; -500 by default.
 /// crop : sequence of int, shape (3, 2), optional
-///     Keep only this box of voxels: first and one past the last along i, j and k.
+///     Keep only this box of voxels: first index and one past the last along i, j and k.
 /// inside : array_like, shape (3,), optional
-///     A point inside the wanted limb when the scan shows several, ct frame, mm.
+///     A point inside the wanted limb if the scan shows several, ct frame, mm.
 /// keep : array_like, shape (n, 3), optional
-///     Points inside further bodies to keep as parts of the limb, ct frame, mm: a splint, or a part that only touches the limb.
+///     Points inside other bodies to keep as parts of the limb, ct frame, mm: a splint, or a part that only touches the limb.
 /// remove : array_like, shape (n, 4), optional
-///     Balls in which nothing is limb: centre, ct frame, mm, and radius, mm.
+///     Balls to remove from the limb: centre in the ct frame and radius, mm.
 /// joint : array_like, shape (3,), optional
 ///     Centre of the joint, ct frame, mm.
 /// axis_source : {"bone", "limb"}, optional
-///     Which centres in the two regions define the axis.
+///     Whose centres in the two regions define the axis: those of the bone or of the whole limb.
 /// joint_region, calf_region : array_like, shape (2,), optional
-///     Regions whose centres define the axis, mm from the joint towards proximal.
+///     Regions whose centres define the axis: start and end, mm proximal to the joint.
 /// axis : array_like, shape (2, 3), optional
 ///     Two points that the axis runs through, ct frame, mm, instead of the centres of two regions.
 /// anterior : array_like, shape (3,), optional
@@ -132,13 +132,14 @@ fn with_bones(
 /// plane : array_like, shape (3, 3), optional
 ///     Three points of the plane under the limb, ct frame, mm: one distal, two proximal.
 /// bones : str or os.PathLike, optional
-///     Which bone each voxel belongs to, for labels: NIfTI, NRRD or MetaImage in the scan's frame.
+///     Label volume of the bones, for computed labels: NIfTI, NRRD or MetaImage in the scan's frame.
 /// bone_numbers : (int, int, int)
-///     Numbers of tibia, fibula and talus in ``bones``.
+///     Label values of tibia, fibula and talus in ``bones``.
 /// segment_bones : str or os.PathLike, optional
-///     Separate the bones in the scan and write them here: NIfTI, NRRD or MetaImage. Refused, with the place, where they touch.
+///     Segment the bones in the scan and write the label volume here: NIfTI, NRRD or MetaImage. If bones touch, raises an error that
+///     names the place.
 /// replace : bool
-///     Replace a file of segmented bones that is there.
+///     Replace an existing ``segment_bones`` file.
 /// threads : int, optional
 ///     Worker threads; one per core by default.
 ///

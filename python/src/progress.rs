@@ -1,9 +1,9 @@
-//! Progress of long calls: a function, or a bar.
+//! Progress of long calls: a function or a progress bar.
 
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
-/// What receives done and total: the function given, a bar of tqdm for True, nothing for False and None.
+/// The function to call with done and total: the given one, a tqdm progress bar for True, none for False and None.
 pub fn observer<'py>(
     py: Python<'py>,
     progress: Option<&Bound<'py, PyAny>>,
