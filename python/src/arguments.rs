@@ -1,12 +1,12 @@
-//! Whole numbers among the arguments: what does not fit is refused with its range.
+//! Integer arguments: values out of range raise an error that states the range.
 
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::*;
 
-/// Most threads that can be asked for.
+/// Largest number of threads.
 const MOST_THREADS: usize = 1024;
 
-/// Whole numbers from 0 on that fit in `BITS` bits, alone, in a list, or None.
+/// Extracts non-negative integers that fit in `BITS` bits: one, a list of them, or None.
 pub fn whole<'py, const BITS: u32, T: FromPyObjectOwned<'py>>(
     object: &Bound<'py, PyAny>,
 ) -> PyResult<T> {
@@ -28,7 +28,7 @@ pub fn whole<'py, const BITS: u32, T: FromPyObjectOwned<'py>>(
         })
 }
 
-/// A number of threads; None stands for one per core.
+/// Extracts a number of threads; None means one per core.
 pub fn threads_of(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     let refused = |found: String| {
         PyValueError::new_err(format!(

@@ -1,4 +1,4 @@
-//! Arrays of numpy: those taken from Python are checked first, those handed to Python are not copied as long as their owner stays alive.
+//! numpy arrays: arrays from Python are checked; arrays for Python are views that keep their owner alive.
 
 use numpy::ndarray::{ArrayView, Dimension, ShapeBuilder};
 use numpy::{
@@ -9,13 +9,13 @@ use pyo3::exceptions::{PyBufferError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The type and the shape of an array, as messages name them.
+/// Type and shape of an array for messages.
 fn described(array: &Bound<'_, PyUntypedArray>) -> String {
     let dtype = array.dtype().to_string();
     format!("{dtype} of shape {}", shape(array.shape()))
 }
 
-/// A shape as numpy prints it.
+/// A shape in numpy's notation.
 fn shape(sizes: &[usize]) -> String {
     let sizes: Vec<String> = sizes.iter().map(ToString::to_string).collect();
     match &sizes[..] {
@@ -24,7 +24,7 @@ fn shape(sizes: &[usize]) -> String {
     }
 }
 
-/// An array of any type: anything else is refused.
+/// Extracts an array of any type; other objects are refused.
 pub fn untyped<'a, 'py>(
     object: &'a Bound<'py, PyAny>,
     name: &str,
@@ -38,9 +38,9 @@ pub fn untyped<'a, 'py>(
     })
 }
 
-/// The elements of an array of exactly the type `T` and `dimensions` dimensions, the first index fastest.
+/// Elements of an array of type `T` and `dimensions` dimensions, with the first index fastest.
 ///
-/// Elements in the memory order of C are put into that order; those that are not contiguous are refused.
+/// C-ordered elements are reordered; arrays that are not contiguous are refused.
 pub fn first_fastest<T: Element + Copy>(
     object: &Bound<'_, PyAny>,
     name: &str,
@@ -74,7 +74,7 @@ pub fn first_fastest<T: Element + Copy>(
     Ok((reversed.iter().copied().collect(), sizes))
 }
 
-/// An array of a type, or of its own, whose elements lie where the processor wants them; copied if they do not.
+/// An aligned array, converted to `dtype` if given; copied if necessary.
 pub fn required<'py>(
     object: &Bound<'py, PyAny>,
     dtype: Option<&str>,
@@ -83,7 +83,7 @@ pub fn required<'py>(
     numpy.call_method1("require", (object, dtype, ["ALIGNED"]))
 }
 
-/// Numbers in any form that numpy understands, as float64 with a given shape; sizes of 0 take any length.
+/// Numbers in any form that numpy accepts, as float64 with the expected shape; an expected size of 0 allows any length.
 pub fn numbers(object: &Bound<'_, PyAny>, name: &str, expected: &[usize]) -> PyResult<Vec<f64>> {
     let py = object.py();
     let array = required(object, Some("float64")).map_err(|error| {
@@ -105,7 +105,7 @@ pub fn numbers(object: &Bound<'_, PyAny>, name: &str, expected: &[usize]) -> PyR
     Ok(values)
 }
 
-/// As [`numbers`], all of them finite.
+/// Like [`numbers`], but all must be finite.
 pub fn finite<const N: usize>(
     object: &Bound<'_, PyAny>,
     name: &str,
@@ -125,7 +125,7 @@ pub fn point(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
     finite(object, name, &[3])
 }
 
-/// Points, one in a row.
+/// Points, one per row.
 pub fn points<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 3]; N]> {
     let rows = rows_of(object, name, N)?;
     Ok(rows.try_into().expect("as many as the shape holds"))
@@ -140,7 +140,7 @@ pub fn row_list<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResu
     }
 }
 
-/// Rows of N finite numbers; 0 rows stand for any number.
+/// Rows of N finite numbers; `rows` 0 allows any number of them.
 fn rows_of<const N: usize>(
     object: &Bound<'_, PyAny>,
     name: &str,
@@ -164,7 +164,7 @@ pub fn matrix(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 4]; 4]> 
     }))
 }
 
-/// An array of one row for each item.
+/// An array with one row per item.
 pub fn of_rows<T: Element, const N: usize>(
     py: Python<'_>,
     rows: Vec<[T; N]>,
@@ -173,10 +173,10 @@ pub fn of_rows<T: Element, const N: usize>(
     rows.into_flattened().into_pyarray(py).reshape([count, N])
 }
 
-/// A read-only view of elements that belong to `owner`: no copy.
+/// A read-only view of elements that belong to `owner`, without a copy.
 ///
 /// # Safety
-/// The elements must stay where they are, unchanged, as long as `owner` lives.
+/// The elements must not be moved or changed while `owner` is alive.
 #[allow(unsafe_code)]
 pub unsafe fn view<'py, T: Element, D: Dimension>(
     owner: Bound<'py, PyAny>,
@@ -184,14 +184,14 @@ pub unsafe fn view<'py, T: Element, D: Dimension>(
     shape: impl ShapeBuilder<Dim = D>,
 ) -> PyResult<Bound<'py, PyArray<T, D>>> {
     let elements = ArrayView::from_shape(shape, elements).expect("as many as the shape holds");
-    // SAFETY: numpy keeps `owner` alive as long as the array; the caller promises that the elements live as long and do not
-    // change, and the array is made read-only before anyone else sees it.
+    // SAFETY: numpy keeps `owner` alive as long as the array; the caller guarantees that the elements live as long and do not
+    // change, and the array is made read-only before it is returned.
     let array = unsafe { PyArray::borrow_from_array(&elements, owner) };
     array.call_method1("setflags", (false,))?;
     Ok(array)
 }
 
-/// What `__array__` gives: the array, of another type if one is asked for; NumPy 2 asks with `copy` for one, or for none.
+/// Result of `__array__`: the array, converted to `dtype` if given. NumPy 2 requires or forbids a copy with `copy`.
 pub fn converted<'py>(
     array: Bound<'py, PyAny>,
     dtype: Option<&Bound<'py, PyAny>>,
@@ -210,10 +210,10 @@ pub fn converted<'py>(
     }
 }
 
-/// What `__dlpack__` gives of a read-only view; `options` are numpy's.
+/// Result of `__dlpack__` for a read-only view; `options` are numpy's.
 ///
-/// A copy, since not all libraries respect that an array is read-only; with `copy=False` the view itself, which numpy exports as
-/// read-only from version 2.1 on if the other side knows DLPack 1.0, and refuses otherwise.
+/// A copy, since not all libraries respect that an array is read-only; with `copy=False` the view itself, which numpy 2.1 or later
+/// exports as read-only if the consumer supports DLPack 1.0, and otherwise refuses.
 pub fn exported<'py>(
     view: &Bound<'py, PyAny>,
     options: Option<&Bound<'py, PyDict>>,
@@ -228,7 +228,7 @@ pub fn exported<'py>(
     }
 }
 
-/// What `__dlpack__` gives of an array that was computed for this export, and that nobody else has.
+/// Result of `__dlpack__` for an array that was computed for this export and has no other users.
 pub fn given_away<'py>(
     array: &Bound<'py, PyAny>,
     options: Option<&Bound<'py, PyDict>>,
@@ -242,7 +242,7 @@ pub fn given_away<'py>(
     }
 }
 
-/// The option `copy` of `__dlpack__`, and the others.
+/// Splits the option `copy` of `__dlpack__` from the others.
 fn split_copy<'py>(
     py: Python<'py>,
     options: Option<&Bound<'py, PyDict>>,
@@ -258,7 +258,7 @@ fn split_copy<'py>(
     Ok((copy.extract()?, options))
 }
 
-/// What `__dlpack_device__` gives.
+/// Result of `__dlpack_device__`.
 pub fn device<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     array.call_method0("__dlpack_device__")
 }

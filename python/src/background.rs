@@ -1,4 +1,4 @@
-//! Long calls: they run while other Python threads do, report their progress and end on Ctrl-C.
+//! Long calls: other Python threads keep running, progress is reported, and Ctrl-C ends the call.
 
 use std::any::Any;
 use std::ops::ControlFlow;
@@ -13,35 +13,35 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::errors::InternalError;
 
-/// How long a signal waits until it is seen.
+/// Interval between checks for signals.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// How long a call waits for work that was asked to stop. Work that takes longer ends by itself, and its result is dropped.
+/// How long a call waits for work to stop. Work that takes longer continues in the background, and its result is discarded.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Bytes of the stack of a thread: as much as the main thread of the program has.
+/// Stack size of a thread, bytes: the same as that of the program's main thread.
 const STACK: usize = 8 << 20;
 
-/// What the work sends to the call that waits for it.
+/// What the work sends to the waiting call.
 enum Event<T> {
-    /// Done and total, in a unit of the work.
+    /// Done and total, in units of the work.
     Progress(f64, f64),
     Ended(Result<T, Box<dyn Any + Send>>),
 }
 
-/// Passes progress to the call that waits, and its wish to stop to the work.
+/// Passes progress to the waiting call, and its request to stop to the work.
 pub struct Watch {
     stop: Arc<AtomicBool>,
     report: Box<dyn Fn(f64, f64) + Send + Sync>,
 }
 
 impl Watch {
-    /// True once the work shall stop.
+    /// True once the work must stop.
     pub fn stop(&self) -> &AtomicBool {
         &self.stop
     }
 
-    /// Reports `done` of `total` units, and says whether to go on.
+    /// Reports `done` of `total` units and returns whether to continue.
     pub fn report(&self, done: f64, total: f64) -> ControlFlow<()> {
         (self.report)(done, total);
         if self.stop.load(Ordering::Relaxed) {
@@ -51,13 +51,13 @@ impl Watch {
     }
 }
 
-/// Threads of the last call, and the process that they belong to: they do not survive a fork.
+/// Threads of the last call, with their process, since they do not survive a fork.
 static THREADS: Mutex<Option<(u32, usize, Arc<ThreadPool>)>> = Mutex::new(None);
 
 fn pool(threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     let count = threads.unwrap_or(0);
     let process = std::process::id();
-    // Held with the interpreter's lock, so that no fork of Python leaves it locked.
+    // Held together with the GIL, so that no fork in Python leaves it locked.
     let mut kept = THREADS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((of, size, pool)) = &*kept
         && (*of, *size) == (process, count)
@@ -77,16 +77,16 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     if let Some((of, _, earlier)) = kept.replace((process, count, pool.clone()))
         && of != process
     {
-        // Its threads stayed in the parent: nobody is there to be told to end.
+        // Its threads exist only in the parent process and cannot be joined here.
         std::mem::forget(earlier);
     }
     Ok(pool)
 }
 
-/// Runs `work` on `threads` threads while other threads of Python run; `progress` is called with done and total units.
+/// Runs `work` on `threads` threads while other Python threads keep running; `progress` is called with done and total units.
 ///
-/// Ctrl-C and exceptions of `progress` stop the work; if it cannot stop within half a second, it runs on to its end beside the
-/// program and its result is dropped.
+/// Ctrl-C and exceptions in `progress` stop the work; if it cannot stop within half a second, it continues in the background and
+/// its result is discarded.
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -105,7 +105,7 @@ pub fn run<T: Send + 'static>(
     };
     pool.spawn(move || {
         let ended = catch_unwind(AssertUnwindSafe(|| work(&watch)));
-        // Nobody listens any more if the call was interrupted.
+        // Nothing receives it if the call was interrupted.
         let _ = sender.send(Event::Ended(ended));
     });
     let interrupted = loop {
@@ -145,7 +145,7 @@ fn reporting<T: Send + 'static>(sender: Sender<Event<T>>) -> Box<dyn Fn(f64, f64
     })
 }
 
-/// The exception of a panic.
+/// The exception for a panic.
 fn defect(panic: &(dyn Any + Send)) -> PyErr {
     let text = panic
         .downcast_ref::<String>()

@@ -172,7 +172,7 @@ impl PyDataset {
         PyArray1::from_vec(py, self.samples.iter().map(|sample| sample.label).collect())
     }
 
-    /// Sample at a place in the endless random sequence of a training, with its augmented image.
+    /// Return the sample at a place in the endless random sequence of a training, with its augmented image.
     ///
     /// Step ``s`` of a training with batches of ``b`` samples uses the places from ``s * b`` on. Another program can thus train on the
     /// same batches as :func:`train` if its ``training`` selects the same samples.

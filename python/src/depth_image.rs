@@ -35,7 +35,7 @@ impl PyDepthImage {
     #[allow(unsafe_code)]
     fn z_mm<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let image = this.get();
-        // SAFETY: the image is never changed or moved within its frozen object.
+        // SAFETY: the image is neither changed nor moved within its frozen object.
         unsafe { view(this.clone().into_any(), &image.image.z_mm, image.shape()) }
     }
 

@@ -1,4 +1,4 @@
-//! Exceptions: the sentence of a library's error, with the causes behind it.
+//! Exceptions with the messages of the libraries' errors and of their causes.
 
 use std::error::Error;
 use std::io;
@@ -11,17 +11,17 @@ create_exception!(
     ppa,
     PpaError,
     PyValueError,
-    "What ppa refuses: what was found, what was expected, and where."
+    "Raised for invalid input: says what was found, what was expected, and where."
 );
 
 create_exception!(
     ppa,
     InternalError,
     PyRuntimeError,
-    "A defect of ppa: a computation ended where it should not have."
+    "Raised for a bug in ppa: a computation ended unexpectedly."
 );
 
-/// Options of the command line that sentences of the libraries name, and what stands for them in Python; a longer one first.
+/// Command-line options in messages of the libraries, and their replacements in Python; longer options come first.
 const KEYWORDS: [(&str, &str); 9] = [
     (" --axis-source bone", " axis_source=\"bone\""),
     (" --limb other", " limb=\"other\""),
@@ -37,7 +37,7 @@ const KEYWORDS: [(&str, &str); 9] = [
     ),
 ];
 
-/// A sentence for callers of Python.
+/// A message for callers in Python.
 fn in_python(sentence: &str) -> String {
     let words = KEYWORDS.iter();
     words.fold(sentence.to_owned(), |text, (option, keyword)| {
@@ -45,8 +45,8 @@ fn in_python(sentence: &str) -> String {
     })
 }
 
-/// The exception of a library's error: `OSError`, or one of its kinds such as `FileNotFoundError`, where the system refused
-/// something or a library did not find a file, else [`PpaError`].
+/// The exception for a library's error: `OSError` or a subclass such as `FileNotFoundError` if the system reported the error or a
+/// library did not find a file, otherwise [`PpaError`].
 pub fn raised(error: impl Error + 'static) -> PyErr {
     let sentence = in_python(&error_chain(&error));
     let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
@@ -61,9 +61,9 @@ pub fn raised(error: impl Error + 'static) -> PyErr {
     PpaError::new_err(sentence)
 }
 
-/// Turns a library's result into Python's.
+/// Converts a library's result to a Python result.
 pub trait OrRaise<T> {
-    /// The value, or the exception of the error.
+    /// The value, or the exception for the error.
     fn or_raise(self) -> Result<T, PyErr>;
 }
 

@@ -1,4 +1,4 @@
-//! Exposures by either engine: what is asked for, and how it is carried out beside the interpreter.
+//! Exposures by either engine: their settings, and their simulation outside the interpreter.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -33,7 +33,7 @@ pub enum ExposeError {
     Dose(#[from] DoseError),
 }
 
-/// Which doses are counted.
+/// Which doses are scored.
 #[derive(Clone, Copy, PartialEq)]
 enum Doses {
     None,
@@ -41,11 +41,11 @@ enum Doses {
     Voxels,
 }
 
-/// One exposure, as asked for.
+/// Settings of one exposure.
 pub enum Exposure {
     /// Ray-traced primary, Monte Carlo scatter, added noise.
     Fast { seed: u64 },
-    /// Photon by photon.
+    /// Analog Monte Carlo.
     Analog(Analog),
 }
 
@@ -105,7 +105,7 @@ impl Exposure {
         }
     }
 
-    /// Puts the load of the tube into the settings of a fast exposure.
+    /// Writes the tube load into the settings of a fast exposure.
     pub fn load(
         &self,
         settings: &mut XraySettings,
@@ -119,7 +119,7 @@ impl Exposure {
                 "histories, mas and exposure_index are mutually exclusive: give only one of them",
             ));
         }
-        settings.analog = None; // The engine of the call decides.
+        settings.analog = None; // The engine is an argument of the call.
         let load = mas.map(TubeLoad::Mas);
         let load = load.or(exposure_index.map(TubeLoad::ExposureIndex));
         if load.is_some() && matches!(self, Self::Analog(_)) {
@@ -140,7 +140,7 @@ impl Exposure {
     }
 }
 
-/// A fast exposure, with its progress.
+/// Simulates a fast exposure and reports its progress.
 pub fn fast(
     phantom: &PreparedPhantom,
     spectrum: &Spectrum,
@@ -153,7 +153,7 @@ pub fn fast(
 }
 
 impl Analog {
-    /// Follows photons until all are followed, or a limit is reached.
+    /// Follows photons until all histories are done or a limit is reached.
     pub fn follow(
         &self,
         phantom: &PreparedPhantom,

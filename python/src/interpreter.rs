@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use pyo3::exceptions::PyImportError;
 use pyo3::{PyResult, Python, ffi};
 
-/// No interpreter has this number.
+/// An ID that no interpreter has.
 const NONE: i64 = -1;
 
-/// Refuses every interpreter but the first that imports the module. Since Python 3.12 the interpreter does so by itself.
+/// Refuses every interpreter except the first that imports the module. Python 3.12 and later do this themselves.
 #[allow(unsafe_code)]
 pub fn require_first(_: Python<'_>) -> PyResult<()> {
     static FIRST: AtomicI64 = AtomicI64::new(NONE);
-    // SAFETY: this thread is attached to an interpreter, which is what both functions ask for.
+    // SAFETY: this thread is attached to an interpreter, as both functions require.
     let id = unsafe { ffi::PyInterpreterState_GetID(ffi::PyInterpreterState_Get()) };
     match FIRST.compare_exchange(NONE, id, Ordering::Relaxed, Ordering::Relaxed) {
         Ok(_) => Ok(()),

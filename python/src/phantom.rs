@@ -35,7 +35,7 @@ fn limb(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult<Limb
     }
 }
 
-/// Create the CT of a limb phantom.
+/// Create the CT of a limb phantom built from geometric shapes.
 ///
 /// Parameters
 /// ----------

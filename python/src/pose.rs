@@ -116,7 +116,8 @@ impl PyPose {
         rows(py, motion.to_homogeneous_rows())
     }
 
-    /// dict of numpy.ndarray, shape (4, 4): rigid transforms by name, ``target_from_source``, between scan, patient, room, device and cameras, mm.
+    /// dict of numpy.ndarray, shape (4, 4): rigid transforms by name, ``target_from_source``, between scan, patient, room, device and
+    /// cameras, mm.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rig = self.scene.plan.depth.cameras().or_raise()?;

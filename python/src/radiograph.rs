@@ -1,4 +1,4 @@
-//! `ppa.Radiograph`: energy on the detector by what happened to the photons, with standard errors.
+//! `ppa.Radiograph`: energy imparted to the detector by category of photons, with standard errors.
 
 use std::path::PathBuf;
 
@@ -14,17 +14,17 @@ use crate::errors::OrRaise;
 use crate::values::{from_table, plain, table};
 use crate::volume::PyVolume;
 
-/// An exposure that was made.
+/// A finished exposure.
 pub struct Made {
     pub radiograph: Radiograph,
     pub dose: Option<Dose>,
-    /// Lattice of the dose of voxels.
+    /// Voxel grid of the dose map.
     pub grid: Option<Grid>,
     pub receptor: Receptor,
     pub presentation: Presentation,
 }
 
-/// Energy that photons leave in the pixels of the detector, eV/cm² per history, with standard errors.
+/// Energy imparted to the pixels of the detector, eV/cm² per history, with standard errors.
 ///
 /// Images have the shape (rows, columns); columns run along device x, rows along device y.
 #[pyclass(frozen, module = "ppa", name = "Radiograph")]
@@ -32,7 +32,7 @@ pub struct PyRadiograph {
     made: Made,
 }
 
-/// The engine by its name.
+/// Name of an engine.
 fn engine_name(engine: Engine) -> &'static str {
     match engine {
         Engine::Analog => "analog",
@@ -57,7 +57,7 @@ impl PyRadiograph {
         values.into_pyarray(py).reshape(self.shape())
     }
 
-    /// A plane of every layer by name.
+    /// One plane of each layer, by name of the layer.
     #[allow(unsafe_code)]
     fn planes<'py>(
         this: &Bound<'py, Self>,
@@ -73,14 +73,14 @@ impl PyRadiograph {
             .chain(electronic.map(|layer| ("electronic", layer)))
         {
             let owner = this.clone().into_any();
-            // SAFETY: the radiograph is never changed, and stays where it is in its frozen object.
+            // SAFETY: the radiograph is neither changed nor moved within its frozen object.
             let array = unsafe { view(owner, plane(layer), this.get().shape())? };
             dict.set_item(name, array)?;
         }
         Ok(dict)
     }
 
-    /// The presentation of pictures: that of the scene, a named one, or one by its keys.
+    /// The presentation of a picture: that of the scene, a named one, or one given by its keys.
     fn presentation(
         &self,
         protocol: Option<&Bound<'_, PyAny>>,
@@ -103,7 +103,7 @@ impl PyRadiograph {
 #[pymethods]
 impl PyRadiograph {
     /// dict of numpy.ndarray, shape (rows, columns), float32: "primary", "compton", "rayleigh" and "multiple", and "electronic"
-    /// where the detector has noise of its own; eV/cm² per history. Read-only views.
+    /// if the detector has electronic noise; eV/cm² per history. Read-only views.
     #[getter]
     fn layers<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         Self::planes(this, |layer| &layer.value)
@@ -115,7 +115,7 @@ impl PyRadiograph {
         Self::planes(this, |layer| &layer.sigma)
     }
 
-    /// numpy.ndarray, shape (rows, columns), float32: all layers together, eV/cm² per history.
+    /// numpy.ndarray, shape (rows, columns), float32: sum of all layers, eV/cm² per history.
     #[getter]
     fn total<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         self.of_pixels(py, self.made.radiograph.total())
@@ -127,7 +127,7 @@ impl PyRadiograph {
         self.of_pixels(py, self.made.radiograph.sigma())
     }
 
-    /// numpy.ndarray, shape (rows, columns): reading with nothing in the beam, eV/cm² per history.
+    /// numpy.ndarray, shape (rows, columns): signal with nothing in the beam, eV/cm² per history.
     #[getter]
     fn open_field<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let radiograph = &self.made.radiograph;
@@ -140,31 +140,31 @@ impl PyRadiograph {
         )
     }
 
-    /// dict: energy on the whole detector by category, eV per history, with standard errors.
+    /// dict: energy imparted to the whole detector by category, eV per history, with standard errors.
     #[getter]
     fn sums<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plain(py, &self.made.radiograph.sums)
     }
 
-    /// Histories that the noise of the image stands for; infinite for the expected image.
+    /// Number of histories whose noise the image has; infinite for the expected image.
     #[getter]
     fn histories(&self) -> f64 {
         self.made.radiograph.histories
     }
 
-    /// Photons that the tube emits into the field per mAs; None where the spectrum does not know.
+    /// Photons that the tube emits into the field per mAs; None if the fluence of the spectrum is unknown.
     #[getter]
     fn histories_per_mas(&self) -> Option<f64> {
         self.made.radiograph.histories_per_mas
     }
 
-    /// Tube load whose quantum noise the image carries, mAs; None where the spectrum does not know.
+    /// Tube load whose quantum noise the image has, mAs; None if the fluence of the spectrum is unknown.
     #[getter]
     fn mas(&self) -> Option<f64> {
         self.made.radiograph.mas()
     }
 
-    /// Exposure index by IEC 62494-1; None where it is not known.
+    /// Exposure index of IEC 62494-1; None for the expected image or an image without signal.
     #[getter]
     fn exposure_index(&self) -> PyResult<Option<f64>> {
         self.made
@@ -185,7 +185,7 @@ impl PyRadiograph {
         self.made.radiograph.detector.pixel_mm
     }
 
-    /// dict or None: energy imparted and air kerma, if they were counted. ``phantom`` and ``materials`` hold ``mass_g`` and
+    /// dict or None: energy imparted and air kerma, if they were scored. ``phantom`` and ``materials`` hold ``mass_g`` and
     /// ``ev_per_history`` with ``value`` and ``se``; air kerma is in Gy per history.
     #[getter]
     fn dose<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
@@ -212,7 +212,7 @@ impl PyRadiograph {
         Ok(Some(dict))
     }
 
-    /// Volume: absorbed dose of each voxel, µGy per mAs, if ``dose="map"`` was asked for.
+    /// Volume: absorbed dose of each voxel, µGy per mAs; requires an exposure with ``dose="map"``.
     fn dose_map(&self) -> PyResult<PyVolume> {
         let (Some(dose), Some(grid)) = (&self.made.dose, &self.made.grid) else {
             return Err(PyValueError::new_err(
@@ -223,7 +223,7 @@ impl PyRadiograph {
         Ok(PyVolume { volume, file: None })
     }
 
-    /// numpy.ndarray, shape (rows, columns), uint16: grey values for viewing, 0 for the bare field.
+    /// numpy.ndarray, shape (rows, columns), uint16: grey values for display; 0 where nothing is in the beam.
     ///
     /// Parameters
     /// ----------
@@ -231,7 +231,7 @@ impl PyRadiograph {
     ///     Fixed window and contrast: "limb", "ankle_ap", "ankle_mortise", "ankle_lateral", or the keys of
     ///     ``[xray.presentation]``; those of the scene by default.
     /// fitted : bool
-    ///     Fit the window to this image alone; images to be compared or trained on need a fixed window.
+    ///     Fit the window to this image; images for comparison or training need a fixed window.
     #[pyo3(signature = (protocol=None, *, fitted=false))]
     fn picture<'py>(
         &self,
@@ -244,7 +244,7 @@ impl PyRadiograph {
         self.of_pixels(py, grey)
     }
 
-    /// Write the picture as 16-bit PNG, or all layers with standard errors as OpenEXR. A file that is there is replaced.
+    /// Write the picture as 16-bit PNG, or all layers with standard errors as OpenEXR. An existing file is replaced.
     ///
     /// Parameters
     /// ----------
@@ -278,7 +278,7 @@ impl PyRadiograph {
         }
     }
 
-    /// Draw the picture with matplotlib, on axes that are given or in a new figure, which are returned.
+    /// Draw the picture with matplotlib on ``ax`` or in a new figure, and return the axes.
     #[pyo3(signature = (ax=None))]
     fn plot<'py>(
         this: &Bound<'py, Self>,

@@ -20,7 +20,7 @@ use crate::volume::rows;
 /// Parameters
 /// ----------
 /// plan : Plan or path of plan.toml, optional
-///     Room, cameras, soft tissue and x-ray settings; the built-in room and the paper's settings by default.
+///     Room, cameras, soft tissue and x-ray settings; by default, the built-in room with the paper's settings.
 /// room : str or os.PathLike, optional
 ///     Room file, instead of a plan.
 #[pyclass(frozen, module = "ppa", name = "Scene")]
@@ -32,11 +32,11 @@ pub struct PyScene {
 pub struct Scene {
     pub plan: Arc<Plan>,
     pub table: Arc<Table>,
-    /// Cameras, by the sensor that they were made with, the last first.
+    /// Cameras by sensor, the latest first.
     setups: Mutex<Vec<(Option<SensorSpec>, Arc<SceneSetup>)>>,
 }
 
-/// How many sensors a scene keeps its cameras for.
+/// Number of sensors for which a scene keeps its cameras.
 const SENSORS_KEPT: usize = 4;
 
 impl Scene {
@@ -48,7 +48,7 @@ impl Scene {
         })
     }
 
-    /// The built-in room with the paper's settings, made once.
+    /// The built-in room with the paper's settings, created once.
     pub fn built_in() -> Result<Arc<Self>, SceneSetupError> {
         static BUILT_IN: Mutex<Option<Arc<Scene>>> = Mutex::new(None);
         let mut kept = BUILT_IN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -60,7 +60,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The cameras with the sensor of the plan, or another one.
+    /// The cameras with the given sensor, or that of the plan.
     pub fn setup(&self, sensor: Option<SensorSpec>) -> Result<Arc<SceneSetup>, SceneSetupError> {
         let sensor = sensor.or_else(|| self.plan.depth.sensor.clone());
         let mut setups = self.setups.lock().unwrap_or_else(PoisonError::into_inner);
@@ -108,7 +108,7 @@ impl PyScene {
         }
     }
 
-    /// dict of numpy.ndarray, shape (4, 4): rigid motions by name, ``target_from_source``, mm.
+    /// dict of numpy.ndarray, shape (4, 4): rigid transforms by name, ``target_from_source``, mm.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rig = self.scene.plan.depth.cameras().or_raise()?;
@@ -129,7 +129,7 @@ impl PyScene {
         self.scene.table.room.device.source_detector_mm
     }
 
-    /// Draw table, x-ray source, detector and cameras with matplotlib, on axes that are given or in a new figure, which are returned.
+    /// Draw table, x-ray source, detector and cameras with matplotlib on ``ax`` or in a new figure, and return the axes.
     #[pyo3(signature = (ax=None))]
     fn plot<'py>(
         this: &Bound<'py, Self>,
@@ -145,7 +145,7 @@ impl PyScene {
     }
 }
 
-/// Motions by name.
+/// Transforms by name.
 pub fn frames<'py>(py: Python<'py>, frames: &Frames) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (name, motion) in &frames.motions {

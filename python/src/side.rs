@@ -4,7 +4,7 @@ use ppa_core::Side;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// The side of a letter.
+/// Parses a side.
 pub fn side(text: &str) -> PyResult<Side> {
     match text {
         "l" | "left" => Ok(Side::Left),
@@ -15,7 +15,7 @@ pub fn side(text: &str) -> PyResult<Side> {
     }
 }
 
-/// The letter of a side.
+/// The letter for a side.
 pub fn letter(side: Side) -> &'static str {
     match side {
         Side::Left => "l",

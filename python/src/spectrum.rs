@@ -1,4 +1,4 @@
-//! `ppa.Spectrum`: which photons leave the x-ray tube.
+//! `ppa.Spectrum`: energy spectrum of the photons.
 
 use std::sync::Arc;
 
@@ -9,14 +9,14 @@ use pyo3::prelude::*;
 use crate::arrays::numbers;
 use crate::errors::OrRaise;
 
-/// The spectrum of a tungsten tube behind filters.
+/// Spectrum of a tungsten tube with filters.
 ///
 /// Parameters
 /// ----------
 /// kvp : float
 ///     Tube voltage, kV.
 /// filters : sequence of str
-///     As "MATERIAL:mm"; 2.5 mm of aluminium by default.
+///     Filters as "MATERIAL:mm"; by default 2.5 mm of aluminium.
 /// anode_angle_deg : float
 ///     Angle of the anode, degrees.
 #[pyclass(frozen, module = "ppa", name = "Spectrum")]
@@ -35,7 +35,7 @@ impl PySpectrum {
         Self::of(Spectrum::tungsten(&tube).or_raise()?)
     }
 
-    /// Photons of one energy.
+    /// Create the spectrum of photons with a single energy.
     ///
     /// Parameters
     /// ----------
@@ -46,14 +46,14 @@ impl PySpectrum {
         Self::of(Spectrum::monoenergetic(energy_kev).or_raise()?)
     }
 
-    /// A spectrum from bins of energy.
+    /// Create a spectrum from energy bins.
     ///
     /// Parameters
     /// ----------
     /// edges_kev : array_like, shape (n + 1,)
     ///     Edges of the bins, ascending, keV.
     /// weights : array_like, shape (n,)
-    ///     Photons in each bin, in any unit.
+    ///     Photons in each bin, in arbitrary units.
     #[staticmethod]
     fn from_bins(edges_kev: &Bound<'_, PyAny>, weights: &Bound<'_, PyAny>) -> PyResult<Self> {
         let edges = numbers(edges_kev, "edges_kev", &[0])?;
@@ -67,7 +67,7 @@ impl PySpectrum {
         PyArray1::from_slice(py, self.spectrum.edges_kev())
     }
 
-    /// numpy.ndarray, shape (n,): share of the photons in each bin.
+    /// numpy.ndarray, shape (n,): fraction of the photons in each bin.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.spectrum.bins().map(|(_, weight)| weight).collect())

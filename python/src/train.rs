@@ -1,4 +1,4 @@
-//! `ppa.train`: a network from datasets.
+//! `ppa.train`: training of a network on datasets.
 
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use crate::errors::OrRaise;
 use crate::progress::observer;
 use crate::values::{plain, table};
 
-/// What messages call the settings, which lie in no file; paths start at the current folder.
+/// Name of the settings in messages, in place of a file; relative paths start at the current folder.
 const SETTINGS: &str = "ppa.train";
 
-/// A dataset by its folder, or with a selection of its samples.
+/// A dataset given by its folder, or by the keys of a selection of its samples.
 fn source(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Table> {
     if let Ok(keys) = object.cast::<PyDict>() {
         return table(keys, name);
@@ -46,10 +46,10 @@ fn sources(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
     Ok(Value::Array(tables.into_iter().map(Value::Table).collect()))
 }
 
-/// Train a network on labelled datasets; goes on where an earlier call in the folder ended.
+/// Train a network on labelled datasets; resumes an interrupted training in the same folder.
 ///
-/// Ctrl-C ends the call within a second. The step that is being made is then finished beside the program and the checkpoint written;
-/// the next call goes on from there and ends with the same bytes.
+/// Ctrl-C ends the call within a second. The current step is finished and the checkpoint written in the background; the next call
+/// resumes from there and ends with the same bytes.
 ///
 /// Parameters
 /// ----------
@@ -59,28 +59,30 @@ fn sources(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
 /// out : str or os.PathLike
 ///     Folder of the training.
 /// evaluation : path, dict or list of them, optional
-///     What to measure errors on: other persons.
+///     Datasets to measure errors on, with other persons.
 /// preset : {"quick", "standard", "paper"}
-///     Settings to begin with: minutes, a quarter of an hour, or days on two cores.
+///     Default settings: training takes minutes, a quarter of an hour, or days on two cores.
 /// seed : int, optional
-///     In place of the preset's.
+///     Replaces the preset's seed.
 /// progress : bool or callable, optional
-///     True for a bar of tqdm, or a function of done and total steps.
+///     True for a tqdm progress bar, or a function of done and total steps.
 /// threads : int, optional
 ///     Worker threads; one per core by default.
 /// **settings
-///     Keys of a configuration in place of the preset's, e.g. ``steps=800``, ``views="pairs"`` or ``augmentation={"noise_probability": 0}``.
+///     Keys of a configuration that replace the preset's, e.g. ``steps=800``, ``views="pairs"`` or
+///     ``augmentation={"noise_probability": 0}``.
 ///
 /// Warns
 /// -----
 /// UserWarning
-///     Of severe findings of the datasets that no case acknowledges, and of a ``start`` trained with ``mirror`` where this training has none.
+///     If the datasets have severe findings that no case acknowledges, or if ``start`` was trained with ``mirror=True`` and this
+///     training has ``mirror=False``.
 ///
 /// Returns
 /// -------
 /// dict
-///     ``steps``; ``last_loss``, None where no step was left to make; and ``start``: what of the weights in ``start`` was not taken as it
-///     stood. :func:`training_log` gives losses and errors.
+///     ``steps``; ``last_loss``, None if no step was left; and ``start``: which weights of ``start`` were converted, missing or unused.
+///     :func:`training_log` gives losses and errors.
 #[pyfunction]
 #[pyo3(signature = (training, out, *, evaluation=None, preset="standard", seed=None, progress=None, threads=None, **settings))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
@@ -117,7 +119,7 @@ pub fn train<'py>(
         let mut last_loss = None;
         let ended = make(&config, &folder, watch.stop(), |progress| {
             last_loss = Some(progress.loss);
-            // The flag that the training looks at says whether to go on.
+            // The training itself reads the stop flag.
             let _ = watch.report(progress.step as f64, progress.steps as f64);
         });
         ended.map(|_| last_loss)
@@ -129,7 +131,7 @@ pub fn train<'py>(
     Ok(trained)
 }
 
-/// What a training measured, finished or not.
+/// Read the log of a training, finished or not.
 ///
 /// Parameters
 /// ----------
@@ -139,9 +141,9 @@ pub fn train<'py>(
 /// Returns
 /// -------
 /// list of dict
-///     For a ``pandas.DataFrame``: ``step``, ``seconds``, and in rows of steps ``training/loss`` and ``training/rate``, in rows of
-///     evaluations ``evaluation/mae``, ``evaluation/mse``, ``evaluation/r_s``, ``evaluation/gap`` and ``training/mae``. Empty without
-///     a log.
+///     Rows for a ``pandas.DataFrame`` with ``step`` and ``seconds``. Rows of steps also have ``training/loss`` and ``training/rate``,
+///     rows of evaluations ``evaluation/mae``, ``evaluation/mse``, ``evaluation/r_s``, ``evaluation/gap`` and ``training/mae``. Empty
+///     if there is no log.
 #[pyfunction]
 pub fn training_log(py: Python<'_>, run: PathBuf) -> PyResult<Bound<'_, PyList>> {
     let rows = read_log(&run.join("log.jsonl")).or_raise()?;

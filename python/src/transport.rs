@@ -1,4 +1,4 @@
-//! `ppa.Transport`: radiographs of any voxels and materials.
+//! `ppa.Transport`: radiographs of arbitrary voxels and materials.
 
 use std::sync::Arc;
 
@@ -23,24 +23,24 @@ use crate::spectrum::PySpectrum;
 use crate::values::{from_table, table, word};
 use crate::volume::{PyVolume, affine, grid};
 
-/// Voxels of material and density that photons travel through; vacuum outside them.
+/// Voxels with materials and densities for photon transport; vacuum outside.
 ///
 /// Parameters
 /// ----------
 /// material : numpy.ndarray, shape (ni, nj, nk), uint8
-///     Index into ``materials`` of voxel (i, j, k).
+///     Index of the material of voxel (i, j, k) in ``materials``.
 /// density_g_cm3 : numpy.ndarray, shape (ni, nj, nk), float32
-///     Mass density of each voxel.
+///     Mass density of each voxel, g/cm³.
 /// materials : sequence of Material or str
-///     At most 256.
+///     At most 256 materials.
 /// affine : array_like, shape (4, 4)
-///     From voxel indices to the ct frame, mm.
+///     Transform from voxel indices to the ct frame, mm.
 /// interpolation : {"nearest", "trilinear"}
-///     Density between the centres of voxels.
+///     Interpolation of the density between voxel centres.
 #[pyclass(frozen, module = "ppa", name = "Transport")]
 pub struct PyTransport {
     phantom: Arc<PreparedPhantom<'static>>,
-    /// What the voxels were prepared with.
+    /// Settings with which the voxels were prepared.
     settings: XraySettings,
 }
 
@@ -87,14 +87,14 @@ impl PyTransport {
         ))
     }
 
-    /// Voxels of a CT: material and density follow from Hounsfield units; trilinear between the centres of voxels.
+    /// Create the voxels of a CT, with materials and densities from Hounsfield units and trilinear interpolation.
     ///
     /// Parameters
     /// ----------
     /// volume : Volume
     ///     The scan.
     /// calibration : dict, optional
-    ///     HU to material and density, as ``[xray.calibration]`` of plan.toml.
+    ///     Conversion of HU to material and density, as in ``[xray.calibration]`` of plan.toml.
     /// mask : numpy.ndarray, shape (ni, nj, nk), bool, optional
     ///     Voxels outside it become air.
     /// threads : int, optional
@@ -134,7 +134,7 @@ impl PyTransport {
         Ok(Self::of(voxels.or_raise()?))
     }
 
-    /// list of str: names of the materials that occur.
+    /// list of str: names of the materials; for a CT, those that occur.
     #[getter]
     fn materials(&self) -> Vec<String> {
         let materials = self.phantom.phantom().materials().iter();
@@ -143,22 +143,22 @@ impl PyTransport {
             .collect()
     }
 
-    /// numpy.ndarray, shape (4, 4): from voxel indices to the ct frame, mm.
+    /// numpy.ndarray, shape (4, 4): transform from voxel indices to the ct frame, mm.
     #[getter]
     fn affine<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         affine(py, self.phantom.phantom().grid())
     }
 
-    /// Radiograph of the voxels.
+    /// Simulate a radiograph of the voxels.
     ///
     /// Parameters
     /// ----------
     /// ct_from_device : array_like, shape (4, 4)
     ///     Pose of the x-ray device in the ct frame, mm: source at the origin, z along the beam towards the detector.
     /// source_detector_mm : float
-    ///     Distance from the source to the detector plane.
+    ///     Distance from the source to the detector plane, mm.
     /// spectrum : Spectrum, optional
-    ///     In place of that of the settings.
+    ///     Replaces the spectrum of the settings.
     /// technique, xray, engine, histories, mas, exposure_index, target_error, seconds, dose, seed, progress, threads
     ///     As for :meth:`Pose.radiograph`; detector, source and receptor are keys of ``xray``.
     ///

@@ -1,4 +1,4 @@
-//! Settings and results: dictionaries of Python as tables of TOML, and back.
+//! Settings and results: conversion between Python dictionaries and TOML tables.
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -9,12 +9,12 @@ use toml::{Table, Value};
 
 use crate::errors::{InternalError, PpaError};
 
-/// A value of Python as one of TOML; None is left out of dictionaries.
+/// Converts a Python value to TOML; entries of dictionaries that are None are omitted.
 fn value(object: &Bound<'_, PyAny>, key: &str) -> PyResult<Value> {
     if let Ok(dict) = object.cast::<PyDict>() {
         return table(dict, key).map(Value::Table);
     }
-    // Before whole numbers, which truth values are as well.
+    // Before integers, since Python's bool is an int.
     if object.is_instance_of::<PyBool>() {
         return object.extract().map(Value::Boolean);
     }
@@ -44,7 +44,7 @@ fn value(object: &Bound<'_, PyAny>, key: &str) -> PyResult<Value> {
     )))
 }
 
-/// A dictionary as a table of TOML.
+/// Converts a dictionary to a TOML table.
 pub fn table(dict: &Bound<'_, PyDict>, name: &str) -> PyResult<Table> {
     let mut table = Table::new();
     for (key, item) in dict {
@@ -59,26 +59,26 @@ pub fn table(dict: &Bound<'_, PyDict>, name: &str) -> PyResult<Table> {
     Ok(table)
 }
 
-/// What a table says, refused with the key at fault.
+/// Deserialises a table; an error names the invalid key.
 pub fn from_table<T: DeserializeOwned>(table: Table, name: &str) -> PyResult<T> {
     table
         .try_into()
         .map_err(|error| PpaError::new_err(format!("{name}: {}", error.to_string().trim_end())))
 }
 
-/// A word out of a few, as files write it.
+/// Parses one of several names, spelled as in files.
 pub fn word<T: DeserializeOwned>(text: &str, name: &str) -> PyResult<T> {
     Value::String(text.to_owned())
         .try_into()
         .map_err(|error| PyValueError::new_err(format!("{name}: {}", error.to_string().trim_end())))
 }
 
-/// Settings as a table.
+/// Converts settings to a table.
 pub fn to_table(value: &impl Serialize) -> PyResult<Table> {
     Table::try_from(value).map_err(|error| InternalError::new_err(error.to_string()))
 }
 
-/// A table as a dictionary.
+/// Converts a table to a dictionary.
 pub fn dictionary<'py>(py: Python<'py>, table: &Table) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (key, value) in table {
@@ -102,7 +102,7 @@ fn of_toml<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     })
 }
 
-/// A result as the JSON of the command line has it: dictionaries, lists, numbers, text, None.
+/// Converts a result to the structure of the command line's JSON: dictionaries, lists, numbers, text, None.
 pub fn plain<'py>(py: Python<'py>, result: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let value = serde_json::to_value(result);
     of_json(

@@ -1,4 +1,4 @@
-//! `ppa.Volume`: Hounsfield units on a lattice.
+//! `ppa.Volume`: Hounsfield units on a voxel grid.
 
 use std::path::PathBuf;
 
@@ -14,23 +14,23 @@ use crate::background::run;
 use crate::errors::OrRaise;
 use crate::values::plain;
 
-/// A CT volume: Hounsfield units and where their voxels lie.
+/// A CT volume: Hounsfield units on a voxel grid.
 ///
 /// Parameters
 /// ----------
 /// voxels : numpy.ndarray, shape (ni, nj, nk), int16 or float32
-///     Hounsfield units of voxel (i, j, k). Contiguous in either memory order; copied once.
+///     Hounsfield units of voxel (i, j, k). C- or Fortran-contiguous; copied once.
 /// affine : array_like, shape (4, 4)
-///     From voxel indices to the scan's LPS frame in mm: ``affine @ (i, j, k, 1)`` is the centre of a voxel.
+///     Transform from voxel indices to the scan's LPS frame, mm: ``affine @ (i, j, k, 1)`` is the centre of a voxel.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Another type or number of dimensions, elements that are not contiguous, values that are not finite, a singular affine.
+///     If type or number of dimensions is wrong, elements are not contiguous, values are not finite, or the affine is singular.
 #[pyclass(frozen, module = "ppa", name = "Volume")]
 pub struct PyVolume {
     pub volume: Volume,
-    /// The file and what it says of itself; None for voxels that came from memory.
+    /// The file and its metadata; None for voxels from memory.
     pub file: Option<ScanFile>,
 }
 
@@ -41,7 +41,7 @@ pub struct ScanFile {
     pub reading: ReadOptions,
 }
 
-/// The lattice of a size and an affine.
+/// A voxel grid from its size and affine.
 pub fn grid(size: &[usize], affine: &Bound<'_, PyAny>) -> PyResult<Grid> {
     let rows = matrix(affine, "affine")?;
     if rows[3] != [0.0, 0.0, 0.0, 1.0] {
@@ -55,7 +55,7 @@ pub fn grid(size: &[usize], affine: &Bound<'_, PyAny>) -> PyResult<Grid> {
     Grid::new(size, Affine3::from_matrix_unchecked(rows)).or_raise()
 }
 
-/// The affine of a lattice, row by row.
+/// The affine of a voxel grid.
 pub fn affine<'py>(py: Python<'py>, grid: &Grid) -> Bound<'py, PyArray2<f64>> {
     let matrix = grid.ct_from_voxel().matrix();
     rows(
@@ -64,7 +64,7 @@ pub fn affine<'py>(py: Python<'py>, grid: &Grid) -> Bound<'py, PyArray2<f64>> {
     )
 }
 
-/// A matrix of four rows.
+/// A 4 x 4 array from its rows.
 pub fn rows(py: Python<'_>, rows: [[f64; 4]; 4]) -> Bound<'_, PyArray2<f64>> {
     numpy::ndarray::arr2(&rows).into_pyarray(py)
 }
@@ -99,11 +99,11 @@ impl PyVolume {
     /// path : str or os.PathLike
     ///     Folder or file.
     /// series : int or str, optional
-    ///     Which series of a DICOM folder that holds several: its number, or its UID.
+    ///     Number or UID of the series to read, if a DICOM folder contains several.
     /// fill_gaps : bool
     ///     Interpolate DICOM slices that are missing or unevenly spaced, instead of refusing the series.
     /// force : bool
-    ///     Read other modalities than CT and values not in HU, instead of refusing them.
+    ///     Read modalities other than CT and values not in HU, instead of refusing them.
     /// threads : int, optional
     ///     Worker threads; one per core by default.
     ///
@@ -146,12 +146,12 @@ impl PyVolume {
         })
     }
 
-    /// A volume of an image of SimpleITK or nibabel; copied once.
+    /// Create a volume from a SimpleITK or nibabel image; copied once.
     ///
     /// Parameters
     /// ----------
     /// image : SimpleITK.Image or nibabel image
-    ///     Hounsfield units in three dimensions.
+    ///     Three-dimensional image in Hounsfield units.
     ///
     /// Returns
     /// -------
@@ -163,22 +163,22 @@ impl PyVolume {
         Self::new(py, &voxels, &affine)
     }
 
-    /// The volume as an image of SimpleITK, which copies it.
+    /// Convert to a SimpleITK image, which copies the voxels.
     fn to_simpleitk<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::as_image(this, "to_simpleitk")
     }
 
-    /// The volume as a NIfTI image of nibabel, which shares its voxels.
+    /// Convert to a nibabel NIfTI image, which shares the voxels.
     fn to_nibabel<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::as_image(this, "to_nibabel")
     }
 
-    /// Write the volume in the format of the name: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices.
+    /// Write the volume in the format of the extension: .nii, .nii.gz, .nrrd, .mha, .mhd, or DICOM slices in a new folder.
     ///
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     File or folder to write; a file that is there is replaced.
+    ///     File or folder to write; an existing file is replaced.
     #[pyo3(signature = (path, *, threads=None))]
     fn save(
         &self,
@@ -190,9 +190,9 @@ impl PyVolume {
         run(py, threads, None, move |_| write(&path, &volume))?.or_raise()
     }
 
-    /// numpy.ndarray, shape (ni, nj, nk): Hounsfield units, int16 where all are whole, else float32.
+    /// numpy.ndarray, shape (ni, nj, nk): Hounsfield units, int16 or float32.
     ///
-    /// A read-only view: no voxel is copied.
+    /// A read-only view without a copy.
     #[getter]
     #[allow(unsafe_code)]
     fn voxels<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -200,7 +200,7 @@ impl PyVolume {
         let volume = &this.get().volume;
         let shape = volume.grid().size().f();
         let owner = this.clone().into_any();
-        // SAFETY: the voxels of a volume are never changed, and it stays where it is in its frozen object.
+        // SAFETY: the voxels of a volume are neither changed nor moved while its frozen object is alive.
         Ok(unsafe {
             match volume.values() {
                 Values::I16(hu) => view(owner, hu, shape)?.into_any(),
@@ -209,7 +209,7 @@ impl PyVolume {
         })
     }
 
-    /// numpy.ndarray, shape (4, 4): from voxel indices to the scan's LPS frame, mm.
+    /// numpy.ndarray, shape (4, 4): transform from voxel indices to the scan's LPS frame, mm.
     #[getter]
     fn affine<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         affine(py, self.volume.grid())
@@ -234,25 +234,25 @@ impl PyVolume {
         self.file.as_ref().map(|file| file.path.clone())
     }
 
-    /// Doubts about the file: a list of dictionaries with ``code`` and ``text``.
+    /// Possible problems with the file: a list of dictionaries with ``code`` and ``text``.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let warnings = self.file.as_ref().map(|file| &file.scan.warnings[..]);
         plain(py, &warnings.unwrap_or_default())
     }
 
-    /// SHA-256 over size, affine and values: the identity of a scan, whatever its file is called.
+    /// SHA-256 over size, affine and values: identifies a scan regardless of its file.
     #[getter]
     fn sha256(&self) -> String {
         self.volume.sha256()
     }
 
-    /// The voxels ``low`` to ``high``, exclusive, at the same place.
+    /// Extract the voxels from ``low`` to ``high`` (exclusive) without moving them.
     ///
     /// Parameters
     /// ----------
     /// low, high : tuple of int, length 3
-    ///     First voxel, and one past the last, along i, j and k.
+    ///     First voxel and one past the last along i, j and k.
     ///
     /// Returns
     /// -------
@@ -280,7 +280,7 @@ impl PyVolume {
 }
 
 impl PyVolume {
-    /// The image that a function of `ppa._images` makes of voxels and affine.
+    /// Converts voxels and affine with a function of `ppa._images`.
     fn as_image<'py>(this: &Bound<'py, Self>, function: &str) -> PyResult<Bound<'py, PyAny>> {
         let (py, grid) = (this.py(), this.get().volume.grid());
         let images = py.import("ppa._images")?;
