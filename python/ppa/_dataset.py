@@ -1,4 +1,4 @@
-"""Datasets in other processes."""
+"""Reopening of datasets in other processes."""
 
 from typing import Any
 
@@ -6,5 +6,5 @@ from ._ppa import Dataset
 
 
 def open_dataset(arguments: dict[str, Any]) -> Dataset:
-    """Open a dataset again, as pickle does in the workers of a data loader."""
+    """Reopen a dataset, for pickle in the workers of a data loader."""
     return Dataset(**arguments)

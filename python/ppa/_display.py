@@ -1,4 +1,4 @@
-"""Pictures in notebooks."""
+"""Images for display in notebooks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def radiograph(image: Radiograph) -> bytes:
-    """The picture as PNG."""
+    """Encode the picture as PNG."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "radiograph.png"
         image.save(path)
@@ -19,7 +19,7 @@ def radiograph(image: Radiograph) -> bytes:
 
 
 def depth(image: DepthImage) -> bytes:
-    """The image in false colour as PNG."""
+    """Encode the image in false colour as PNG."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "depth.png"
         image.save_preview(path)

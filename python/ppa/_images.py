@@ -1,4 +1,4 @@
-"""Images of SimpleITK and nibabel, neither of which is imported before the user has."""
+"""Conversion of SimpleITK and nibabel images; neither library is imported until it is needed."""
 
 import importlib
 import types
@@ -13,7 +13,7 @@ def _library(image: Any) -> types.ModuleType:
 
 
 def _hounsfield(voxels: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Voxels as int16 where all are whole and fit, else as float32; contiguous, which those of a turned image are not."""
+    """Convert voxels to int16 if all are whole and in range, otherwise to float32; reoriented images are made contiguous."""
     if voxels.dtype == np.int16 or voxels.dtype == np.float32:
         return voxels if voxels.flags.forc else np.asfortranarray(voxels)
     if voxels.dtype.kind not in "iuf":
@@ -26,7 +26,7 @@ def _hounsfield(voxels: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def parts(image: Any) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
-    """Voxels by (i, j, k), and the affine from them to LPS in mm."""
+    """Return the voxels, indexed by (i, j, k), and the affine from voxel indices to LPS, mm."""
     affine = np.eye(4)
     if hasattr(image, "GetDirection") and hasattr(image, "GetSpacing"):
         if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
@@ -39,7 +39,7 @@ def parts(image: Any) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
         affine[:3, 3] = image.GetOrigin()
     elif hasattr(image, "dataobj") and hasattr(image, "affine"):
         voxels = np.asanyarray(image.dataobj)
-        # NIfTI points to the right and to the front, LPS to the left and to the back.
+        # NIfTI axes point right and anterior, LPS axes left and posterior.
         affine = np.diag([-1.0, -1.0, 1.0, 1.0]) @ np.asarray(image.affine, dtype=np.float64)
     else:
         raise TypeError(f"the image is of type {type(image).__name__}, expected one of SimpleITK or nibabel")
@@ -49,7 +49,7 @@ def parts(image: Any) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
 
 
 def to_simpleitk(voxels: npt.NDArray[Any], affine: npt.NDArray[np.float64]) -> Any:
-    """An image of SimpleITK, which has right-angled or sheared axes as given."""
+    """Convert to a SimpleITK image, with orthogonal or sheared axes as in the affine."""
     sitk = importlib.import_module("SimpleITK")
     image = sitk.GetImageFromArray(np.transpose(voxels))
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
@@ -60,6 +60,6 @@ def to_simpleitk(voxels: npt.NDArray[Any], affine: npt.NDArray[np.float64]) -> A
 
 
 def to_nibabel(voxels: npt.NDArray[Any], affine: npt.NDArray[np.float64]) -> Any:
-    """A NIfTI image of nibabel."""
+    """Convert to a nibabel NIfTI image."""
     nibabel = importlib.import_module("nibabel")
     return nibabel.Nifti1Image(voxels, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine)

@@ -1,4 +1,4 @@
-"""Pictures by matplotlib, which is imported when the first is drawn."""
+"""Plots with matplotlib, which is imported for the first plot."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 if TYPE_CHECKING:
     from ._ppa import Case, DepthImage, Pose, Radiograph, Scene
 
-#: Half a side of the square of the table that is drawn, mm.
+#: Half the side of the square part of the table that is drawn, mm.
 _TABLE_MM = 400.0
-#: Edge of the cubes in which the vertices of a skin are drawn as one, mm.
+#: Edge of the cubes whose vertices are merged for drawing a skin, mm.
 _COARSE_MM = 8.0
 
 
@@ -24,7 +24,7 @@ def _axes(ax: Any, **options: Any) -> Any:
 
 
 def radiograph(image: Radiograph, ax: Any) -> Any:
-    """The picture in grey, with the detector in mm."""
+    """Draw the picture in grey, with axes in mm on the detector."""
     axes = _axes(ax)
     rows, columns = image.total.shape
     width, height = columns * image.pixel_mm / 2, rows * image.pixel_mm / 2
@@ -34,7 +34,7 @@ def radiograph(image: Radiograph, ax: Any) -> Any:
 
 
 def depth(image: DepthImage, ax: Any) -> Any:
-    """Depths in colour; white where nothing is seen."""
+    """Draw depths in colour; white where nothing is seen."""
     axes = _axes(ax)
     depths = np.ma.masked_equal(image.z_mm, 0)
     drawn = axes.imshow(depths, cmap="viridis_r")
@@ -44,7 +44,7 @@ def depth(image: DepthImage, ax: Any) -> Any:
 
 
 def _coarse(vertices: Any, triangles: Any) -> tuple[Any, Any]:
-    """A skin whose vertices in each cube are replaced by their mean: matplotlib draws some thousand triangles, not 10⁵."""
+    """Replace the vertices in each cube by their mean: matplotlib draws some thousand triangles, but not 10⁵."""
     _, cube, count = np.unique(np.floor(vertices / _COARSE_MM), axis=0, return_inverse=True, return_counts=True)
     cube = cube.ravel()
     columns: list[Any] = [np.bincount(cube, column) / count for column in vertices.T]
@@ -62,7 +62,7 @@ def _skin(axes: Any, vertices: Any, triangles: Any) -> None:
 
 
 def case(limb: Case, ax: Any) -> Any:
-    """The skin in the scan with joint, axis and the points of the supporting plane."""
+    """Draw the skin in the scan with joint, axis and the points of the supporting plane."""
     axes = _axes(ax, projection="3d")
     _skin(axes, limb.vertices, limb.triangles)
     along = limb.axis[1] - limb.axis[0]
@@ -76,7 +76,7 @@ def case(limb: Case, ax: Any) -> Any:
 
 
 def _room(axes: Any, room: Scene | Pose, limb: Any) -> Any:
-    """Central beam and cameras around the points `limb`, in the room."""
+    """Draw central beam and cameras in the room; the view also contains the points `limb`."""
     frames = room.frames
     device = frames["room_from_device"]
     beam = np.array([device @ (0.0, 0.0, z, 1.0) for z in (0.0, room.source_detector_mm)])[:, :3]
@@ -95,7 +95,7 @@ def _room(axes: Any, room: Scene | Pose, limb: Any) -> Any:
 
 
 def pose(posed: Pose, ax: Any) -> Any:
-    """The skin in the room with x-ray source, detector and cameras."""
+    """Draw the skin in the room with x-ray source, detector and cameras."""
     axes = _axes(ax, projection="3d")
     vertices = posed.vertices
     _skin(axes, vertices, posed.triangles)
@@ -103,7 +103,7 @@ def pose(posed: Pose, ax: Any) -> Any:
 
 
 def scene(room: Scene, ax: Any) -> Any:
-    """The table around the central beam, with x-ray source, detector and cameras."""
+    """Draw the table around the central beam, with x-ray source, detector and cameras."""
     axes = _axes(ax, projection="3d")
     normal, offset = room.table[:3], room.table[3]
     source, ahead = room.frames["room_from_device"][:3, [3, 2]].T

@@ -1,4 +1,4 @@
-"""Types of the compiled module; its docstrings describe shapes and units."""
+"""Types of the compiled module, whose docstrings describe shapes and units."""
 
 import os
 from collections.abc import Callable, Sequence

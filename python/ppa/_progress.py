@@ -1,10 +1,10 @@
-"""Progress bars of tqdm, in terminals and notebooks."""
+"""tqdm progress bars, in terminals and notebooks."""
 
 from collections.abc import Callable
 
 
 def bar() -> Callable[[float, float], None]:
-    """A bar that is moved by calls with done and total."""
+    """Return a function of done and total that updates a new progress bar."""
     try:
         from tqdm.auto import tqdm
     except ImportError as error:

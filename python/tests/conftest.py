@@ -1,4 +1,4 @@
-"""What the tests share: a small phantom, its case, and the program of the command line."""
+"""Fixtures of the tests: a small phantom, its case, and the command-line program."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 
 import ppa
 
-#: A detector and a room's settings that take little time.
+#: X-ray settings for quick tests.
 QUICK_XRAY = {
     "detector": {"columns": 48, "rows": 40, "pixel_mm": 5.0},
     "engine": {"scatter_histories": 4000, "dose_histories": 1e9},
@@ -68,7 +68,7 @@ def files(tmp_path_factory: pytest.TempPathFactory, volume: ppa.Volume) -> Files
 
 @pytest.fixture(scope="session")
 def labelled(files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A dataset with labels, as readers would leave them."""
+    """A dataset with labels in the format of readers' labels."""
     folder = tmp_path_factory.mktemp("labelled") / "data"
     ppa.generate(files.plan, folder)
     radiographs = sorted((folder / "patient_0" / "xray" / "r").glob("*.png"))
@@ -82,19 +82,19 @@ def labelled(files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def listen() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, even where the shell that started the tests ignores it."""
+    """Ctrl-C raises KeyboardInterrupt, even if the shell that started the tests ignores it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
 def program() -> str:
-    """The program to compare with: one that cargo built, or that of the package."""
+    """The program to compare with: the one that cargo built, or that of the package."""
     return os.environ.get("PPA_PROGRAM") or str(Path(sys.executable).parent / "ppa")
 
 
 def command(*arguments: object) -> str:
-    """Runs a command line, and gives what it prints."""
+    """Run a command line and return its output."""
     ran = subprocess.run(
         [program(), *map(str, arguments)], capture_output=True, text=True, check=False
     )

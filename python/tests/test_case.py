@@ -44,7 +44,7 @@ def test_landmarks_can_be_set(volume: ppa.Volume) -> None:
     along = (axis[1] - axis[0]) / 100
     np.testing.assert_allclose(np.cross(moved[0] - axis[0] - [1, 0, 0], along), 0, atol=1e-6)
     case.anterior = [0, -1, 0]
-    # Only the part across the axis counts.
+    # Only the component perpendicular to the axis counts.
     assert case.anterior @ [0, -1, 0] > 0.99
     assert case.anterior @ (case.axis[1] - case.axis[0]) == pytest.approx(0, abs=1e-9)
     for name, bad in [("joint", [0, 0]), ("axis", [[0, 0, np.nan]] * 2), ("plane", "x"), ("anterior", None)]:

@@ -1,4 +1,4 @@
-"""Datasets as PyTorch reads them, and networks."""
+"""Datasets for PyTorch, and networks."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_a_folder_without_a_training_is_refused(labelled: Path) -> None:
 
 @pytest.fixture(scope="module")
 def training(labelled: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a training of few and small steps on two persons with the same images."""
+    """Folder of a training with few, small steps on two persons with the same images."""
     folder = tmp_path_factory.mktemp("training")
     for patient in (0, 1):
         shutil.copytree(labelled / "patient_0", folder / "data" / f"patient_{patient}")
@@ -113,7 +113,7 @@ def test_networks_say_what_the_command_line_says(training: Path) -> None:
     left, right = (np.array(png.open(frame)).astype(np.uint16) for frame in frames)
     answer = network.predict(left, right, roi_left=regions[0], roi_right=regions[1])
     assert answer["quality"] == json.loads(printed)["quality"]
-    # Rows that are not contiguous are the same rows.
+    # Arrays that are not contiguous give the same result.
     wide = np.repeat(left, 2, axis=1)[:, ::2]
     assert network.predict(wide, right, roi_left=regions[0], roi_right=regions[1]) == answer
     square = network.predict(left[150:370, 200:420], right[160:360, 210:410])

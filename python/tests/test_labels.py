@@ -12,7 +12,7 @@ import ppa
 
 from conftest import Files, command
 
-#: Small and quick radiographs; labels follow from the poses.
+#: Small, quick radiographs; labels depend on the poses alone.
 XRAY = {
     "half_length_mm": 20.0,
     "max_voxel_mm": 5.0,
@@ -23,7 +23,7 @@ XRAY = {
 
 @pytest.fixture(scope="module")
 def ankle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a scan that is fine enough for labels, its bones and its case."""
+    """Folder with a scan that is fine enough for labels, its bones and its case."""
     folder = tmp_path_factory.mktemp("ankle")
     volume = ppa.phantom(spacing_mm=1.2)
     volume.save(folder / "p01.nii")
@@ -34,7 +34,7 @@ def ankle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def dataset(ankle: Path) -> Path:
-    """A dataset of five poses beside its plan."""
+    """A dataset of five poses, with its plan next to it."""
     plan = ppa.Plan(
         [(ankle / "p01.toml", 3)],
         rotation={"from_deg": 0, "to_deg": 36, "step_deg": 9},
@@ -114,7 +114,7 @@ def test_labels_are_those_of_the_command(
 
 
 def test_labels_of_poses_are_those_of_the_dataset(ankle: Path, dataset: Path) -> None:
-    # The plan lies beside the dataset.
+    # The plan is next to the dataset.
     labelled = ppa.label(dataset)
     assert labelled["limbs"][0]["radiographs"] == 5
     rows = {row["angle_deg"]: row for row in ppa.Dataset(dataset, side=32).rows}

@@ -1,4 +1,4 @@
-"""Metrics, tests, spectra and materials: the numbers of the command line."""
+"""Metrics, tests, spectra and materials give the same numbers as the command line."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_what_makes_no_sense_is_refused(call: Any, says: str) -> None:
     assert says in str(refused.value)
 
 
-# Short: the exact test looks at all 2^n signs.
+# Short lists: the exact test evaluates all 2^n sign patterns.
 anything = st.one_of(
     st.none(), st.text(), st.floats(), st.lists(st.one_of(st.floats(), st.none(), st.text()), max_size=12))
 

@@ -1,4 +1,4 @@
-"""The lines of the book's section on other libraries."""
+"""The examples in the book's section on other libraries."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_layers_are_a_dataset_of_xarray(case: ppa.Case, scene: ppa.Scene) -> Non
 def test_skins_are_meshes(case: ppa.Case, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     skin = trimesh.Trimesh(case.vertices, case.triangles)
-    # A lower leg with its foot.
+    # Volume of a lower leg with its foot, mm³.
     assert 1e6 < skin.volume < 1e7
     meshio = pytest.importorskip("meshio")
     meshio.Mesh(case.vertices, [("triangle", case.triangles)]).write(tmp_path / "skin.vtk")

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("listen")
 
 
 def seconds_until_interrupted(call: Callable[[], Any], after: float) -> float:
-    """Sends this process what Ctrl-C sends, and gives the time until the call ends."""
+    """Send SIGINT to this process and return the time until the call ends."""
     sent: list[float] = []
 
     def interrupt() -> None:
@@ -40,7 +40,7 @@ def seconds_until_interrupted(call: Callable[[], Any], after: float) -> float:
 
 
 def computes_on() -> bool:
-    """Whether this process still computes some seconds later."""
+    """Return whether this process is still computing some seconds later."""
     for _ in range(10):
         before = time.process_time()
         time.sleep(0.5)
@@ -82,7 +82,7 @@ def test_ctrl_c_ends_a_dataset_that_is_then_resumed(files: Files, tmp_path: Path
         try:
             summary = ppa.generate(plan, tmp_path / "data")
         except ppa.PpaError:
-            # Poses that were being made are finished beside the program.
+            # Poses in progress are being finished in the background.
             time.sleep(1)
     assert summary["units"] == 4
     assert summary["made"] < 4
@@ -129,7 +129,7 @@ def test_calls_from_several_threads_agree(case: ppa.Case, scene: ppa.Scene) -> N
 
 
 def test_a_call_takes_less_than_a_tenth_of_a_millisecond() -> None:
-    """More than its work, which is none here; the quickest of many, since other programs run as well."""
+    """Overhead of a call whose work is negligible: the fastest of many, since other programs run too."""
     quickest = float("inf")
     for _ in range(2000):
         begin = time.perf_counter()
@@ -159,7 +159,7 @@ assert len(poses) == len(copies) + 1
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not say how much memory is used")
 def test_views_cases_and_poses_take_no_memory_for_voxels() -> None:
-    # In a process of its own: memory that other tests have freed is used again.
+    # In a separate process, since memory freed by other tests would be reused.
     ran = subprocess.run([sys.executable, "-c", VIEWS], capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
 

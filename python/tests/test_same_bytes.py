@@ -39,7 +39,7 @@ def test_cases(files: Files) -> None:
 def test_cases_with_other_bodies(files: Files) -> None:
     whole = ppa.Volume.read(files.scan)
     voxels = whole.voxels.copy()
-    # A block in the air beside the limb.
+    # A block in the air next to the limb.
     voxels[:16, :16, 20:60] = 100
     assert (whole.voxels[:20, :20, 16:64] < -900).all()
     scan = files.folder / "block.nii.gz"

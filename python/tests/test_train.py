@@ -20,7 +20,7 @@ import ppa
 
 from conftest import command
 
-#: Small steps.
+#: Small, quick steps.
 QUICK: dict[str, Any] = {"preset": "quick", "side": 32, "batch_size": 4, "log_every": 1, "views": "pairs"}
 
 

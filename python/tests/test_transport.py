@@ -1,4 +1,4 @@
-"""Transport through voxels of one's own."""
+"""Transport through user-defined voxels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import ppa
 
 AFFINE = np.diag([5.0, 5.0, 5.0, 1.0])
 AFFINE[:3, 3] = -22.5
-#: The source 1 m below the origin of the ct frame along z.
+#: Pose of the device, with the source 1 m below the origin of the ct frame along z.
 POSE = np.eye(4)
 POSE[2, 3] = -1000.0
 XRAY = {"detector": {"columns": 16, "rows": 12, "pixel_mm": 8.0}}
@@ -96,7 +96,7 @@ def test_voxels_that_make_no_sense_are_refused(changes: Any, says: str) -> None:
         cube().radiograph(np.diag([2.0, 1, 1, 1]), 1100.0, xray=XRAY)
 
 
-#: Arguments that make sense, and arrays of any type and shape.
+#: Strategies for arguments: valid ones, and arrays of any type and shape.
 any_array = hnp.arrays(
     dtype=st.one_of(hnp.unsigned_integer_dtypes(), hnp.floating_dtypes(), hnp.boolean_dtypes(), hnp.byte_string_dtypes()),
     shape=hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=3),

@@ -1,4 +1,4 @@
-"""Volumes: what goes in comes out, without copies where none is needed."""
+"""Volumes return the values that were put in, without unnecessary copies."""
 
 from __future__ import annotations
 
