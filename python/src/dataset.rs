@@ -42,7 +42,7 @@ use crate::values::{from_table, table, to_table, word};
 /// every_pose : int, optional
 ///     Use every n-th angle of each limb, starting at the smallest.
 /// labels : str, optional
-///     NAME of the labels in labels.NAME.json; by default those in labels.json.
+///     NAME of the label files labels.NAME.json; by default, labels.json is read.
 /// unlabelled : bool
 ///     Include images without a label, with NaN as the label. By default, they raise an error.
 /// mirror : bool

@@ -125,7 +125,7 @@ impl Labelling {
 ///     Plan of the dataset; by default the file next to its folder, named after it. Its cases name the bones (``bones`` or
 ///     ``segment_bones`` of :func:`prepare`).
 /// scale : {"graded", "strict"}
-///     "graded" grades how far the malleoli cover the gutters, with a diagnostic range fitted to readers; "strict" grades how open
+///     "graded" grades how far the malleoli overlap the talus, with a diagnostic range fitted to readers; "strict" grades how open
 ///     the worst gutter is.
 /// name : str, optional
 ///     Write labels.NAME.json and leave labels.json as it is.

@@ -122,7 +122,7 @@ fn with_bones(
 /// joint : array_like, shape (3,), optional
 ///     Centre of the joint, ct frame, mm.
 /// axis_source : {"bone", "limb"}, optional
-///     Whose centres in the two regions define the axis: those of the bone or of the whole limb.
+///     Structure whose centres in the two regions define the axis: the bone or the whole limb.
 /// joint_region, calf_region : array_like, shape (2,), optional
 ///     Regions whose centres define the axis: start and end, mm proximal to the joint.
 /// axis : array_like, shape (2, 3), optional
