@@ -236,7 +236,7 @@ mod tests {
             (
                 "v.2012-12-12",
                 "v.2011-02-18",
-                "line 29: section DOSE DEPOSITION of another version",
+                "line 29: section DOSE DEPOSITION is from another version",
             ),
             (
                 "#[SECTION VOXELIZED",
