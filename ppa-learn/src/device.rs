@@ -24,14 +24,16 @@ pub enum DeviceName {
 #[non_exhaustive]
 pub enum DeviceError {
     /// No such name.
-    #[error("there is no device {found:?}; expected \"cpu\", \"cuda\" or \"cuda:1\" and so on")]
+    #[error(
+        "unknown device {found:?}; expected \"cpu\", \"cuda\" or a numbered one such as \"cuda:1\""
+    )]
     Unknown {
         /// What stands there.
         found: String,
     },
     /// The feature `cuda` is off.
     #[error(
-        "this program was built for the CPU only; device \"{name}\" needs one that is built with `--features cuda`"
+        "this program was built for the CPU only; device \"{name}\" needs a build with `--features cuda`"
     )]
     NotBuilt {
         /// The device.
@@ -115,7 +117,10 @@ mod tests {
         }
         for name in ["gpu", "CUDA", "cuda:", "cuda:-1", "cuda:x", ""] {
             let error = name.parse::<DeviceName>().unwrap_err().to_string();
-            assert!(error.contains(&format!("no device {name:?}")), "{error}");
+            assert!(
+                error.contains(&format!("unknown device {name:?}")),
+                "{error}"
+            );
         }
     }
 

@@ -32,7 +32,7 @@ pub enum Purpose {
 pub fn stream(seed: u64, purpose: Purpose, index: u64) -> ChaCha8Rng {
     assert!(
         index < 1 << 56,
-        "a stream has the index {index}, expected less than 2^56"
+        "the stream index is {index}, expected less than 2^56"
     );
     let mut stream = ChaCha8Rng::seed_from_u64(seed);
     stream.set_stream((purpose as u64) << 56 | index);

@@ -75,7 +75,7 @@ pub enum WeightsError {
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// An error of candle.
-    #[error("the weights cannot be turned into f32")]
+    #[error("cannot convert the weights to f32")]
     Candle(#[from] candle_core::Error),
 }
 
@@ -89,7 +89,7 @@ fn place(path: &Option<PathBuf>) -> String {
 fn beyond(unused: &[String]) -> String {
     match unused {
         [] => String::new(),
-        names => format!("; not of the network: {}", names.join(", ")),
+        names => format!("; not in the network: {}", names.join(", ")),
     }
 }
 
@@ -165,7 +165,7 @@ fn fitting(tensors: &HashMap<String, Tensor>, entry: &Entry) -> Result<Vec<f32>,
     let values = tensor
         .to_dtype(DType::F32)
         .and_then(|tensor| tensor.flatten_all()?.to_vec1::<f32>());
-    let values = values.map_err(|error| format!("{name} is not made of numbers ({error})"))?;
+    let values = values.map_err(|error| format!("{name} cannot be read as numbers ({error})"))?;
     let least = if name.ends_with("running_var") {
         0.0
     } else {

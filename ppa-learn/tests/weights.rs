@@ -123,7 +123,7 @@ fn networks_of_both_cameras_are_saved_and_loaded() {
             .load(&path, FirstConvolution::Fresh)
             .unwrap_err()
             .to_string();
-        let expected = format!("{name} is missing; not of the network: {name}s");
+        let expected = format!("{name} is missing; not in the network: {name}s");
         assert!(error.ends_with(&expected), "{error}");
         assert_eq!(say(&other), before);
         // Beyond the network, behind a camera's prefix and without one.
@@ -240,7 +240,7 @@ fn everything_that_does_not_fit_is_named_and_changes_nothing() {
         "features.3.1.block.2.fc1.bias is missing",
         "features.8.0.weight has the shape [1280, 320], expected [1280, 320, 1, 1]",
         "features.0.1.bias holds NaN",
-        "features.8.1.running_var holds -1; not of the network: features.9.weight",
+        "features.8.1.running_var holds -1; not in the network: features.9.weight",
     ] {
         assert!(error.contains(part), "{error}");
     }

@@ -76,7 +76,7 @@ def test_trainings_warn_of_findings_and_of_another_mirror(persons: Path, tmp_pat
     with pytest.warns(UserWarning, match=r"severe \[side-mismatch\] limb r of patient 0 of .*data: the fibula lies medially"):
         ppa.train(of(data, 0), tmp_path / "mirrored", mirror=True, steps=1, **QUICK)
     start = tmp_path / "mirrored" / "weights.safetensors"
-    with pytest.warns(UserWarning, match="was trained with mirror = true, this training shows left limbs as they are"):
+    with pytest.warns(UserWarning, match="was trained with mirror = true, but this training shows left limbs without mirroring"):
         ppa.train(of(persons, 0), tmp_path / "run", start=start, mirror=False, steps=1, **QUICK)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -130,7 +130,7 @@ def test_ctrl_c_ends_a_training_that_is_then_resumed(persons: Path, tmp_path: Pa
         ({"stepz": 3}, "ppa.train: unknown field `stepz`"),
         ({"steps": 0}, "steps is 0"),
         ({"side": 8}, "side is 8"),
-        ({"preset": "fast"}, 'there is no preset "fast"'),
+        ({"preset": "fast"}, 'unknown preset "fast"'),
         ({"seed": -1}, "invalid value"),
         ({"training": []}, "training is empty"),
         ({"training": {"datasett": "x"}}, "datasett"),
@@ -150,5 +150,5 @@ def test_trainings_that_make_no_sense_are_refused(
 
 
 def test_a_person_in_training_and_evaluation_is_refused(persons: Path, tmp_path: Path) -> None:
-    with pytest.raises(ppa.PpaError, match="belongs to only one"):
+    with pytest.raises(ppa.PpaError, match="must be in only one"):
         ppa.train(persons, tmp_path / "run", evaluation=of(persons, 1), **QUICK)

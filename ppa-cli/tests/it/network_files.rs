@@ -37,7 +37,7 @@ fn pairs_are_exported_from_trainings_and_weight_files() {
     assert!(refused.contains(expected), "{refused}");
     let refused = fail(folder, "learn export pairs.safetensors right --out no.onnx");
     assert!(
-        refused.contains("takes images of 2 cameras, found those of 1"),
+        refused.contains("expects images of 2 cameras, found images of 1"),
         "{refused}"
     );
     assert!(!folder.join("no.onnx").exists());

@@ -301,7 +301,7 @@ fn calibration_adds_intervals_and_refuses_odd_frames() {
     contains(&fail(folder, &calibrate("0,1")), &["patient 0"]);
     contains(
         &fail(folder, &calibrate("1")),
-        &["21 of calibration, expected at least 5 and 99"],
+        &["21 calibration images, expected at least 5 and 99"],
     );
     let said = succeed(folder, &calibrate("1,2,3,4,5"));
     contains(&said, &["105 pairs of 5 persons", "90.0 %"]);

@@ -65,7 +65,7 @@ fn a_killed_training_resumes_to_the_same_weights() {
     assert!(!folder.join("killed/weights.safetensors").exists());
     let refused = fail(folder, "eval killed");
     assert!(
-        refused.contains("is not finished: ") && refused.contains(" of 8 steps are made"),
+        refused.contains("is not finished: ") && refused.contains(" of 8 steps are done"),
         "{refused}"
     );
     let said = ppa(folder, "train train.toml --out killed --threads 2 --json")
@@ -178,7 +178,7 @@ fn bad_trainings_are_reported_in_one_sentence() {
     fs::write(folder.join("leak.toml"), config.replace("[1]", "[0]")).unwrap();
     let said = fail(folder, "train leak.toml --out run");
     assert!(
-        said.contains("a person belongs to only one of them"),
+        said.contains("a person must be in only one of them"),
         "{said}"
     );
     fs::write(folder.join("nobody.toml"), config.replace("[1]", "[5]")).unwrap();
@@ -189,7 +189,7 @@ fn bad_trainings_are_reported_in_one_sentence() {
     fs::write(folder.join("own/config.toml"), "# mine").unwrap();
     let said = fail(folder, "train train.toml --out own");
     assert!(
-        said.contains("own/config.toml is another configuration"),
+        said.contains("own/config.toml holds another configuration"),
         "{said}"
     );
     assert_eq!(names(&folder.join("own")), ["config.toml"]);
@@ -309,7 +309,7 @@ fn tables_are_marked_while_results_are_missing() {
     fs::write(folder.join("plan.toml"), plan.replace("quick", "fast")).unwrap();
     let refused = fail(folder, "experiment 2a plan.toml --out runs --so-far");
     assert!(
-        refused.contains("plan.toml: there is no preset \"fast\""),
+        refused.contains("plan.toml: unknown preset \"fast\""),
         "{refused}"
     );
 }

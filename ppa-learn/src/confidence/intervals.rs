@@ -22,7 +22,7 @@ pub enum ConfidenceError {
     Coverage(f64),
     /// Too few poses for an interval of finite width.
     #[error(
-        "{found} poses of calibration, expected at least {expected} for intervals of coverage {coverage}"
+        "{found} calibration poses, expected at least {expected} for intervals of coverage {coverage}"
     )]
     TooFew {
         /// Poses of calibration.
@@ -33,7 +33,7 @@ pub enum ConfidenceError {
         coverage: f64,
     },
     /// A label or a prediction that is not finite.
-    #[error("a label or prediction of calibration is not finite")]
+    #[error("a label or prediction of a calibration pose is not finite")]
     NotFinite,
 }
 
@@ -158,7 +158,7 @@ mod tests {
         let few = Intervals::new(&poses[1..], 0.9).unwrap_err();
         assert!(
             few.to_string()
-                .starts_with("8 poses of calibration, expected at least 9"),
+                .starts_with("8 calibration poses, expected at least 9"),
             "{few}"
         );
     }

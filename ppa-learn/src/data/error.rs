@@ -75,7 +75,7 @@ pub enum DataError {
     #[error("there is no image {0}")]
     Empty(String),
     /// A person on both sides of a split.
-    #[error("{0} would be in training and in evaluation; a person belongs to only one of them")]
+    #[error("{0} would be in both training and evaluation; a person must be in only one of them")]
     Leak(String),
     /// A file that is not a depth image.
     #[error(transparent)]

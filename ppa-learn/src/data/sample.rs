@@ -144,7 +144,7 @@ pub(crate) mod tests {
         assert!(split(&first, &elsewhere).is_ok());
         let error = split(&first, &other_foot).unwrap_err().to_string();
         assert!(
-            error.starts_with("data, patient 1 would be in training"),
+            error.starts_with("data, patient 1 would be in both training"),
             "{error}"
         );
     }

@@ -150,7 +150,7 @@ pub fn contiguous_range(layout: &Layout, op: &'static str) -> Result<Range<usize
 
 /// The error of inputs and outputs that lie on different devices.
 pub fn elsewhere() -> Error {
-    Error::msg("inputs and outputs of an operation lie on different devices").bt()
+    Error::msg("inputs and outputs of an operation are on different devices").bt()
 }
 
 #[cfg(test)]

@@ -113,7 +113,8 @@ pub(crate) fn sentence(network_mae: f64, baselines: &[Compared], persons: usize)
         Verdict::NotShown => {
             let p = named(&|b| (b.p_network_better >= SIGNIFICANT).then_some(b.p_network_better));
             format!(
-                "The network's MAE, {network_mae:.3}, is lower than that of every baseline, but {persons} do not show that it is better: p {p}."
+                "The network's MAE, {network_mae:.3}, is lower than that of every baseline, but the difference is not \
+                 significant over {persons}: p {p}."
             )
         }
         Verdict::NotBetter => {
@@ -140,7 +141,9 @@ mod tests {
         assert_eq!(verdict(0.25, &[constant]), Verdict::NotShown);
         let better = sentence(0.25, &[constant], 3);
         assert!(
-            better.ends_with("but 3 persons do not show that it is better: p constant 0.125."),
+            better.ends_with(
+                "but the difference is not significant over 3 persons: p constant 0.125."
+            ),
             "{better}"
         );
         let angle = compared(BaselineKind::Angle, 0.2, 1.0);

@@ -110,9 +110,7 @@ pub struct Configuration {
 
 /// A name that no experiment has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "there is no experiment {0:?}; expected 1, 2a, 2b, 2c, persons, poses, shapes or ablations"
-)]
+#[error("unknown experiment {0:?}; expected 1, 2a, 2b, 2c, persons, poses, shapes or ablations")]
 pub struct UnknownExperiment(String);
 
 impl FromStr for Experiment {

@@ -12,7 +12,7 @@ use crate::random::{Purpose, stream};
 pub enum FoldError {
     /// Not one person for each fold, or nobody left to train with.
     #[error(
-        "{persons} persons cannot be tested in {folds} folds: each fold needs a person to test and one to train with"
+        "{persons} persons cannot be tested in {folds} folds: each fold needs at least one person to test and one to train with"
     )]
     TooFewPersons {
         /// Persons there are.
@@ -22,7 +22,7 @@ pub enum FoldError {
     },
     /// No choice of persons gives every fold the limbs asked for.
     #[error(
-        "no {folds} sets of persons have {limbs} limbs each and leave a person to train with; the limbs of each person number {}",
+        "no choice of {folds} sets of persons gives each set {limbs} limbs and leaves a person to train with; limbs per person: {}",
         ppa_core::text::numbers(counts.iter().map(|&n| n as f64))
     )]
     NoSuchLimbs {

@@ -151,7 +151,7 @@ impl ExperimentPlan {
         ] {
             if let Some(seeds) = seeds.filter(|seeds| !(1..=MAX_PAIRS as u64).contains(seeds)) {
                 return Err(wrong(format!(
-                    "{key} is {seeds}, expected 1 to {MAX_PAIRS}, the most that the exact permutation test takes"
+                    "{key} is {seeds}, expected 1 to {MAX_PAIRS}, the maximum for the exact permutation test"
                 )));
             }
         }
@@ -303,7 +303,7 @@ impl ExperimentPlan {
                 Err(ExperimentError::Plan {
                     path: self.path.clone(),
                     message: format!(
-                        "learning_curves.persons asks for {wanted}, but a fold has {fewest} persons to train with"
+                        "learning_curves.persons asks for {wanted}, but one fold has only {fewest} persons to train with"
                     ),
                 })
             }

@@ -127,7 +127,7 @@ impl Table {
             .filter(|c| !results.columns().contains(c));
         for column in left_out {
             notes.push(format!(
-                "Left out: the column {}, since the plan names no such weights.",
+                "Left out: the column {}, because the plan does not specify such weights.",
                 column.headings().join(", ")
             ));
         }
@@ -138,7 +138,7 @@ impl Table {
         }
         if missing > 0 {
             notes.push(format!(
-                "INCOMPLETE: {} missing; n is the number of seeds in a cell where some are.",
+                "INCOMPLETE: {} missing; in cells with missing test sets, n is the number of seeds.",
                 test_sets_are(missing)
             ));
         }
@@ -148,7 +148,7 @@ impl Table {
         };
         if missing == 0 && rows.iter().any(of_networks) {
             notes.push(
-                "n is the number of seeds for which a metric is defined, – where it is for none: a correlation needs predictions that differ."
+                "n is the number of seeds for which a metric is defined, – means none: a correlation needs predictions that differ."
                     .to_owned(),
             );
         }
@@ -157,7 +157,7 @@ impl Table {
         notes.extend(results.differences().iter().map(Difference::to_string));
         if let Some(noise) = results.label_noise_mae() {
             notes.push(format!(
-                "Labels that vary by their standard deviation about the true ones have a MAE of {noise:.3}."
+                "Labels that vary by their standard deviation about the true ones have an MAE of {noise:.3}."
             ));
         }
         Self {

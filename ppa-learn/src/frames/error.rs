@@ -30,7 +30,7 @@ pub enum FramesError {
         run: PathBuf,
     },
     /// A frame unlike those that the networks were trained with.
-    #[error("{} is unlike the training images: {distance:.2} times as far from them as the limit", frame.display())]
+    #[error("{} is unlike the training images: its distance from them is {distance:.2} times the limit", frame.display())]
     OutOfDistribution {
         /// The frame.
         frame: PathBuf,
@@ -50,7 +50,7 @@ pub enum FramesError {
     Calibration(#[from] ConfidenceError),
     /// Too few images for the limits of the detector.
     #[error(
-        "{training} training images and {calibration} of calibration, expected at least 5 and 99"
+        "{training} training images and {calibration} calibration images, expected at least 5 and 99"
     )]
     FewImages {
         /// Training images of a network.

@@ -83,7 +83,7 @@ impl Networks {
                 found => Err(FramesError::Views {
                     run: left.to_owned(),
                     found,
-                    expected: "\"unified\" or \"pairs\" for a network that stands alone",
+                    expected: "\"unified\" or \"pairs\" for a single network",
                 }),
             };
         };

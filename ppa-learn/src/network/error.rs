@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum NetworkError {
     /// Images of another number of cameras than the network is for.
-    #[error("the network takes images of {}, found those of {found}", ppa_core::text::count(*expected, "camera"))]
+    #[error("the network expects images of {}, found images of {found}", ppa_core::text::count(*expected, "camera"))]
     Cameras {
         /// Cameras whose images were given.
         found: usize,
@@ -13,11 +13,11 @@ pub enum NetworkError {
         expected: usize,
     },
     /// Networks of two cameras of which only one predicts corrections.
-    #[error("only one of both networks predicts corrections")]
+    #[error("only one of the two networks predicts corrections")]
     Targets,
     /// Images of another shape.
     #[error(
-        "images have the shape {found:?}, expected [images, 1, height, width] with nothing empty"
+        "images have the shape {found:?}, expected [images, 1, height, width] with no empty dimension"
     )]
     Shape {
         /// The shape found.
@@ -37,6 +37,6 @@ pub enum NetworkError {
         width: usize,
     },
     /// An error of candle.
-    #[error("the network's arithmetic failed")]
+    #[error("a computation in the network failed")]
     Candle(#[from] candle_core::Error),
 }

@@ -135,7 +135,7 @@ fn check_lengths(moments: usize, variable: usize, gradient: usize) -> Result<(),
         return Ok(());
     }
     Err(Error::Msg(format!(
-        "Adam has moments of {moments} values, the variable has {variable}, its gradient {gradient}"
+        "Adam has moments of {moments} values, but the variable has {variable} and its gradient {gradient}"
     )))
 }
 
@@ -160,7 +160,7 @@ impl InplaceOp2 for Update<'_> {
         gradient_layout: &Layout,
     ) -> Result<(), Error> {
         let CpuStorage::F32(values) = variable else {
-            return Err(Error::Msg("Adam moves variables of f32 only".to_owned()));
+            return Err(Error::Msg("Adam updates f32 variables only".to_owned()));
         };
         let values = &mut values[contiguous_range(layout, self.name())?];
         let gradient =

@@ -75,7 +75,7 @@ fn check_lengths(averages: usize, values: usize) -> Result<(), Error> {
     match averages == values {
         true => Ok(()),
         false => Err(Error::Msg(format!(
-            "{averages} averages of {values} values"
+            "found {averages} averages for {values} values"
         ))),
     }
 }
@@ -98,7 +98,7 @@ impl InplaceOp2 for Move {
         values_layout: &Layout,
     ) -> Result<(), Error> {
         let CpuStorage::F32(average) = average else {
-            return Err(Error::Msg("averages are of f32 only".to_owned()));
+            return Err(Error::Msg("only f32 variables can be averaged".to_owned()));
         };
         let average = &mut average[contiguous_range(layout, self.name())?];
         let values = &values.as_slice::<f32>()?[contiguous_range(values_layout, self.name())?];

@@ -22,7 +22,7 @@ pub fn cautions(config: &TrainConfig) -> Result<Vec<String>, TrainError> {
         && WeightsMetadata::read(start)?.mirror
     {
         cautions.push(format!(
-            "{} was trained with mirror = true, this training shows left limbs as they are",
+            "{} was trained with mirror = true, but this training shows left limbs without mirroring",
             start.display()
         ));
     }

@@ -103,15 +103,15 @@ pub(super) fn load(
     let state = state(&bytes).map_err(wrong)?;
     if state.architecture != ARCHITECTURE {
         let found = state.architecture;
-        return Err(wrong(format!("it is of {found}, expected {ARCHITECTURE}")));
+        return Err(wrong(format!("it is for {found}, expected {ARCHITECTURE}")));
     }
     if state.config.of_results() != config.of_results() {
         return Err(wrong(
-            "its configuration is another one; take another folder".into(),
+            "its configuration differs; use another folder".into(),
         ));
     }
     if let Some(difference) = data.differs(&state.data) {
-        return Err(wrong(difference + "; take another folder"));
+        return Err(wrong(difference + "; use another folder"));
     }
     let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
         .map_err(|e| wrong(e.to_string()))?;

@@ -23,7 +23,7 @@ pub enum ConfigError {
         message: String,
     },
     /// No such preset.
-    #[error("{}: there is no preset {found:?}; expected \"quick\", \"standard\" or \"paper\"", path.display())]
+    #[error("{}: unknown preset {found:?}; expected \"quick\", \"standard\" or \"paper\"", path.display())]
     Preset {
         /// The file.
         path: PathBuf,

@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         for (text, expected) in [
-            ("preset = \"fast\"", "there is no preset \"fast\""),
+            ("preset = \"fast\"", "unknown preset \"fast\""),
             ("stepz = 3", "unknown field `stepz`"),
             ("side = 8", "side is 8, expected 32 to 4096"),
             ("learning_rate = nan", "learning_rate is NaN"),
@@ -208,7 +208,7 @@ mod tests {
             ),
             ("", "training is empty"),
             ("seed = -1", "invalid value"),
-            ("device = \"gpu\"", "there is no device \"gpu\""),
+            ("device = \"gpu\"", "unknown device \"gpu\""),
         ] {
             let data = if text.is_empty() { "" } else { DATA };
             let error = read(&format!("{text}\n{data}")).unwrap_err();

@@ -37,7 +37,9 @@ impl DataState {
     pub fn differs(&self, before: &Self) -> Option<String> {
         if self.samples != before.samples {
             let (now, then) = (self.samples, before.samples);
-            return Some(format!("there are {now} training samples, it had {then}"));
+            return Some(format!(
+                "there are {now} training samples, but it was written with {then}"
+            ));
         }
         let different = [
             ("files", self.names != before.names),
@@ -47,7 +49,8 @@ impl DataState {
         ];
         let different = different.iter().filter(|part| part.1).map(|part| part.0);
         let different = different.collect::<Vec<_>>().join(", ");
-        (!different.is_empty()).then(|| format!("other training data since: {different} differ"))
+        (!different.is_empty())
+            .then(|| format!("the training data have changed since: {different} differ"))
     }
 }
 

@@ -55,7 +55,7 @@ pub enum TrainError {
     #[error("{} is a dataset; choose another folder for the training", .0.display())]
     Dataset(PathBuf),
     /// A training that is not finished, where a finished one is needed.
-    #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]
+    #[error("the training in {} is not finished: {step} of {} are done; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]
     Unfinished {
         /// The folder.
         folder: PathBuf,
@@ -65,7 +65,7 @@ pub enum TrainError {
         steps: u64,
     },
     /// A folder of another training, or of something else.
-    #[error("{} is another configuration, with no checkpoint beside it to resume from; choose another folder", .0.display())]
+    #[error("{} holds another configuration, with no checkpoint next to it to resume from; choose another folder", .0.display())]
     OtherConfig(PathBuf),
     /// Numbers that are not finite.
     #[error("step {step}: the loss is {loss}; {place}")]
@@ -78,7 +78,7 @@ pub enum TrainError {
         place: NonFinite,
     },
     /// candle's arithmetic.
-    #[error("arithmetic failed")]
+    #[error("a computation failed")]
     Candle(#[from] candle_core::Error),
 }
 

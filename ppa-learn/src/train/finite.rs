@@ -26,9 +26,9 @@ impl fmt::Display for NonFinite {
             Self::Parameter(name) => write!(f, "the parameter {name} is not finite"),
             Self::Forward(name) => write!(f, "the first statistics that are not finite are {name}"),
             Self::Backward(name) => {
-                write!(f, "the gradient of {name} is the first not to be finite")
+                write!(f, "the first gradient that is not finite is that of {name}")
             }
-            Self::Output => write!(f, "all layers are finite, inputs or labels are not"),
+            Self::Output => write!(f, "all layers are finite, but inputs or labels are not"),
         }
     }
 }

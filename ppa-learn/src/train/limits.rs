@@ -72,7 +72,7 @@ impl TrainConfig {
             self.weight_average == 0.0 || self.recompute_statistics > 0,
             "recompute_statistics",
             "0".into(),
-            "at least 1 with weight_average, whose weights no batch has passed",
+            "at least 1 with weight_average, because no batch has passed through the averaged weights",
         )?;
         let augmentation = &self.augmentation;
         for (key, share) in [

@@ -101,7 +101,7 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
     runner.add_baselines(&mut results).unwrap();
     let table = Table::complete(&results).unwrap().to_markdown();
     assert!(!table.contains("INCOMPLETE"), "{table}");
-    let note = "Left out: the column pretrained on ImageNet, since the plan names no such weights.";
+    let note = "Left out: the column pretrained on ImageNet, because the plan does not specify such weights.";
     assert!(table.contains(note), "{table}");
     let columns = headings(&table);
     assert!(!columns.contains("ImageNet"), "{columns}");
@@ -218,7 +218,7 @@ fn learning_curves_have_a_column_for_each_amount() {
         .unwrap_err()
         .to_string();
     assert!(
-        refused.ends_with("asks for 4, but a fold has 3 persons to train with"),
+        refused.ends_with("asks for 4, but one fold has only 3 persons to train with"),
         "{refused}"
     );
     let plan = self::plan(folder.path(), &data, &data, 2);
@@ -329,7 +329,7 @@ fn nobody_is_tested_whose_images_were_pretrained_with() {
     let pretrained = runner.runs().iter().position(|run| run.needs().is_some());
     let refused = runner.run(|n| Some(n) == pretrained, &go(), |_| ());
     let refused = format!("{:#}", anyhow::Error::from(refused.unwrap_err()));
-    assert!(refused.contains("would be in training"), "{refused}");
+    assert!(refused.contains("would be in both training"), "{refused}");
     let clinical = Runner::new(&plan, Experiment::TwoB, folder.path()).unwrap_err();
     assert_eq!(
         clinical.to_string(),

@@ -19,7 +19,7 @@ fn a_person_on_both_sides_stops_before_anything_is_written() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("patient 0 would be in training and in evaluation"),
+        error.contains("patient 0 would be in both training and evaluation"),
         "{error}"
     );
     assert!(!folder.path().join("run").exists());
@@ -57,7 +57,7 @@ fn checkpoints_of_other_trainings_are_refused() {
         seed: 2,
         ..config.clone()
     };
-    assert!(error(&other).contains("its configuration is another one"));
+    assert!(error(&other).contains("its configuration differs"));
     let bytes = fs::read(&checkpoint).unwrap();
     let place = bytes
         .windows(15)
@@ -66,7 +66,7 @@ fn checkpoints_of_other_trainings_are_refused() {
     let mut renamed = bytes.clone();
     renamed[place + 14] = b'7';
     fs::write(&checkpoint, &renamed).unwrap();
-    assert!(error(&config).contains("it is of efficientnet_b7, expected efficientnet_b0"));
+    assert!(error(&config).contains("it is for efficientnet_b7, expected efficientnet_b0"));
     for broken in [
         &bytes[..0],
         &bytes[..100],

@@ -119,7 +119,7 @@ fn a_training_resumes_with_the_data_it_began_with_only() {
         text
     };
     let labels = replaced("labels.json", "\"label\":2.0", "\"label\":2.5");
-    assert!(error().contains("since: labels differ; take another folder"));
+    assert!(error().contains("since: labels differ; use another folder"));
     let regions = replaced("roi_depth.json", "\"size\":48", "\"size\":47");
     assert!(error().contains("since: labels, regions of interest differ"));
     fs::write(lists.join("labels.json"), labels).unwrap();
@@ -128,7 +128,7 @@ fn a_training_resumes_with_the_data_it_began_with_only() {
     let image = image.join("patient_0/depth/r/orig/depth_cam_left_45.0.png");
     let away = image.with_extension("away");
     fs::rename(&image, &away).unwrap();
-    assert!(error().contains("there are 2 training samples, it had 3"));
+    assert!(error().contains("there are 2 training samples, but it was written with 3"));
     fs::rename(&away, &image).unwrap();
     assert_eq!(run(&config, folder.path()).unwrap(), Ended::Finished);
 }
