@@ -63,7 +63,7 @@ pub enum MetricError {
     NoNegatives,
     /// A seed with more or fewer folds than the first.
     #[error(
-        "the number of rows of seed {seed} is {found}, expected {expected} as of the first seed"
+        "the number of rows of seed {seed} is {found}, expected {expected} as for the first seed"
     )]
     UnequalFolds {
         /// The seed.
