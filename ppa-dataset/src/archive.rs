@@ -98,7 +98,7 @@ impl Archive {
             match is_there && bytes.len() as u64 == member.size {
                 true => Ok(bytes),
                 false => Err(io::Error::other(format!(
-                    "{} was moved in it by another process",
+                    "{} was moved within the archive by another process",
                     member.name
                 ))),
             }
@@ -184,7 +184,7 @@ pub fn is_archive(root: &Path) -> bool {
 
 /// Refuses an archive where a dataset is to be read from a folder.
 pub(crate) fn require_folder(root: &Path) -> Result<(), FileError> {
-    let extract = "it is an archive; extract it to a folder first, as with tar -xf";
+    let extract = "it is an archive; extract it to a folder first, for example with tar -xf";
     match is_archive(root) && root.exists() {
         true => Err(FileError::at("read", root)(io::Error::other(extract))),
         false => Ok(()),

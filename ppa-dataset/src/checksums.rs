@@ -76,7 +76,7 @@ impl Checksums {
             FoundChecksums::Absent => Self::default(),
             FoundChecksums::Whole(sums) => sums,
             FoundChecksums::Damaged => {
-                let damaged = "it is altered: its hash is not that in its last line; remove it to record hashes again";
+                let damaged = "it is altered: its hash does not match the one in its last line; remove it to record hashes again";
                 return Err(FileError::at("add hashes to", &path)(io::Error::other(
                     damaged,
                 )));

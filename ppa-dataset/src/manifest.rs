@@ -153,7 +153,7 @@ impl Manifest {
         let text = read_text(&path).map_err(|mut error| {
             if error.source.kind() == io::ErrorKind::NotFound {
                 let why = "`ppa generate` and `ppa merge` write it once all poses are made; \
-                           datasets of other programs have none";
+                           datasets of other programs do not have it";
                 error.source = io::Error::new(io::ErrorKind::NotFound, why);
             }
             error

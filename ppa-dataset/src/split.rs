@@ -40,7 +40,7 @@ pub enum SplitError {
     #[error("the split has version {0}; this program reads version 1")]
     Version(u32),
     /// A person in two parts: what is tested was trained on.
-    #[error("patient {patient} is in {first} and in {second}: a person belongs to one part")]
+    #[error("patient {patient} is in {first} and in {second}: a person must be in one part only")]
     Leak {
         /// The person.
         patient: u32,
@@ -50,7 +50,7 @@ pub enum SplitError {
         second: String,
     },
     /// A person of the dataset in no part.
-    #[error("patient {0} is in no part of the split")]
+    #[error("patient {0} is not in any part of the split")]
     Unassigned(u32),
     /// A person that the dataset does not hold.
     #[error("patient {patient} of part {part} is not in the dataset")]
@@ -61,7 +61,7 @@ pub enum SplitError {
         part: String,
     },
     /// A part whose name is not a valid file name on every system.
-    #[error("a part is called {0:?}, expected letters, digits, _ and -, the last not in front")]
+    #[error("the name of a part is {0:?}, expected letters, digits, _ and -, not beginning with -")]
     Name(String),
     /// Shares that cannot be drawn.
     #[error("{0}")]
@@ -224,7 +224,7 @@ fn counts(patients: usize, shares: &[(String, f64)]) -> Result<Vec<usize>, Split
             ));
         }
         if shares[..i].iter().any(|(other, _)| other == name) {
-            return wrong(format!("the part {name} is named twice"));
+            return wrong(format!("the part {name} is given twice"));
         }
     }
     let sum: f64 = shares.iter().map(|(_, share)| share).sum();
@@ -243,7 +243,7 @@ fn counts(patients: usize, shares: &[(String, f64)]) -> Result<Vec<usize>, Split
         None if !counts.is_empty() => Ok(counts),
         None => wrong("no part to draw".to_owned()),
         Some(i) => wrong(format!(
-            "with {} the part {} stays empty; give it a larger share or name fewer parts",
+            "with {} the part {} is empty; give it a larger share or use fewer parts",
             ppa_core::text::count(patients, "person"),
             shares[i].0
         )),

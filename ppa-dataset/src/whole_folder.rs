@@ -14,7 +14,7 @@ pub fn write_whole_folder<T, E: From<FileError>>(
     fill: impl FnOnce(&Path) -> Result<T, E>,
 ) -> Result<T, E> {
     if holds_something(to).map_err(FileError::at("read", to))? {
-        let full = io::Error::other("it is there already and not an empty folder");
+        let full = io::Error::other("it already exists and is not an empty folder");
         return Err(FileError::at("write", to)(full).into());
     }
     let unfinished = beside(to)?;

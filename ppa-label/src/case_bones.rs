@@ -18,7 +18,7 @@ use super::segment::{SegmentError, segment_bones};
 pub enum CaseBonesError {
     /// The limb is a knee.
     #[error(
-        "the scan was prepared as a knee, but bones are for the labels of ankles: prepare it without bones"
+        "the scan was prepared as a knee, but bones are used only for the labels of ankles: prepare it without bones"
     )]
     Knee,
     /// The file that labels them.

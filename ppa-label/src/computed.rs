@@ -106,7 +106,7 @@ pub enum AutoLabelError {
     Knee(LimbId),
     /// The case names no bones.
     #[error(
-        "the case of {0} names no bones: write it again with `ppa prepare --bones` or `--segment-bones`"
+        "the case of {0} does not specify bones: create it again with `ppa prepare --bones` or `--segment-bones`"
     )]
     NoBones(LimbId),
     /// The dataset shows no radiographs of the limb.
@@ -152,7 +152,7 @@ pub enum AutoLabelError {
     #[error(transparent)]
     Scale(#[from] ScaleError),
     /// The name of the file that keeps computed labels where readers graded as well.
-    #[error("labels.computed.json belongs to labels.json: choose another name than {0}")]
+    #[error("labels.computed.json belongs to labels.json: choose a name other than {0}")]
     ReservedName(LabelName),
     /// A file.
     #[error(transparent)]

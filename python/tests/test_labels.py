@@ -147,10 +147,10 @@ def test_what_cannot_be_labelled_is_refused(files: Files, case: ppa.Case, datase
     with pytest.raises(ppa.PpaError, match="does not specify bones"):
         case.place(0).label()
     for settings, says in [
-        ({"scale": "kind"}, "no scale \"kind\""),
-        ({"thresholds": {"hidden_mm": [3, 2, 1, 0]}}, "rising"),
+        ({"scale": "kind"}, "unknown scale \"kind\""),
+        ({"thresholds": {"hidden_mm": [3, 2, 1, 0]}}, "increasing"),
         ({"thresholds": {"at_least": [1, 1, 1, 1]}}, "thresholds"),
-        ({"name": "computed"}, "choose another name"),
+        ({"name": "computed"}, "choose a name other than"),
         ({"plan": files.plan}, "patient 0"),
     ]:
         with pytest.raises(ppa.PpaError, match=says):

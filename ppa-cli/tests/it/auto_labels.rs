@@ -251,7 +251,7 @@ fn refusals(here: &Path) {
     fs::write(here.join("t.toml"), "at_least = [0.1, 0.2, 0.3, 0.4]").unwrap();
     refused(
         "label auto plan --scale strict --thresholds t.toml",
-        "expected four falling numbers",
+        "expected four decreasing numbers",
     );
     refused(
         "label auto plan --thresholds t.toml",
@@ -272,7 +272,7 @@ fn refusals(here: &Path) {
     succeed(here, "prepare p01.nii --side r --out p01.toml --replace");
     refused(
         "label auto plan",
-        "names no bones: write it again with `ppa prepare --bones`",
+        "does not specify bones: create it again with `ppa prepare --bones`",
     );
     succeed(
         here,

@@ -93,7 +93,7 @@ fn what_was_edited_by_hand_is_reported() {
     for (edit, parts) in [
         (
             &(|| fs::write(data.join(image), &whole[..99]).unwrap()) as &dyn Fn(),
-            [image, "not a whole PNG"],
+            [image, "not a complete PNG file"],
         ),
         (
             &|| fs::write(data.join(image), fs::read(&other).unwrap()).unwrap(),
@@ -128,7 +128,7 @@ fn persons_are_split_and_leaks_refused() {
     let data = folder.path().join("data");
     let said = fail(folder.path(), "dataset split data");
     assert!(
-        said.contains("with 1 person the part val stays empty"),
+        said.contains("with 1 person the part val is empty"),
         "{said}"
     );
     succeed(folder.path(), "dataset split data --part train=1");
@@ -256,7 +256,7 @@ fn the_page_of_a_dataset_stands_by_itself() {
     succeed(folder.path(), "qa data --out other.html");
     let page = fs::read_to_string(folder.path().join("other.html")).unwrap();
     for image in images {
-        assert!(page.contains(&format!("{image} is not a whole PNG")));
+        assert!(page.contains(&format!("{image} is not a complete PNG file")));
     }
     assert_eq!(page.matches("src=\"data:image/png").count(), rows.len() + 5);
     assert!(page.contains("verdict bad") && !page.contains("\"verdict good"));

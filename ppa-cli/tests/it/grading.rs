@@ -169,13 +169,13 @@ fn grades_that_cannot_be_are_named_and_nothing_is_written() {
     let [name, image, _] = &key[0];
     refused(
         &format!("{name},a,0.5"),
-        "with 0.5, expected 1, 1.5, 2, 2.5 or 3",
+        "as 0.5, expected 1, 1.5, 2, 2.5 or 3",
     );
-    refused(&format!("{name},a,1.2"), "with 1.2, expected");
+    refused(&format!("{name},a,1.2"), "as 1.2, expected");
     refused(&format!("{name},a,good"), "x.csv is not the expected table");
     refused(
         "0123456789,a,1",
-        "0123456789 is neither a picture of the key",
+        "0123456789 is neither a picture in the key",
     );
     refused(&format!("{name},a,1\n{name},a,2"), "a grades");
     refused(
@@ -264,14 +264,19 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     let report = String::from_utf8(done.stderr).unwrap();
     assert!(
         done.status.success()
-            && report.contains("than those there now: 5 labels, the first of step 0"),
+            && report.contains(
+                "5 labels of radiographs that have since been replaced, the first at step 0"
+            ),
         "{report}"
     );
     for command in ["dataset check data", "export table data --out t.csv"] {
         let refused = fail(here, command);
-        assert!(refused.contains("of step 0"), "{refused}");
+        assert!(refused.contains("step 0"), "{refused}");
     }
     let refused = fail(here, "label import data data/grades.csv");
-    assert!(refused.contains("a graded another radiograph"), "{refused}");
+    assert!(
+        refused.contains("a graded a different version"),
+        "{refused}"
+    );
     assert_eq!(labels(here), before);
 }

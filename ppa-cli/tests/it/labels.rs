@@ -61,7 +61,7 @@ fn agreement_of_readers_from_their_files() {
     .unwrap();
     let refused = fail(folder.path(), "label agree a.csv e.csv");
     assert!(
-        refused.contains("e grades x0.png with 4, expected 1, 1.5, 2, 2.5 or 3"),
+        refused.contains("e grades x0.png as 4, expected 1, 1.5, 2, 2.5 or 3"),
         "{refused}"
     );
     fs::write(

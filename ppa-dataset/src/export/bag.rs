@@ -41,13 +41,13 @@ pub enum BagError {
     #[error("{} is not finished: it has no manifest.jsonl; run ppa generate again", .0.display())]
     Unfinished(PathBuf),
     /// A link or device, whose contents are not part of the dataset.
-    #[error("{} is neither a file nor a folder, and a bag holds nothing else", .0.display())]
+    #[error("{} is neither a file nor a folder, and a bag can hold nothing else", .0.display())]
     Special(PathBuf),
     /// It was asked to stop.
     #[error("the bag was not finished")]
     Stopped(#[from] Stopped),
     /// An image that is not the one in `manifest.jsonl`.
-    #[error("{} is altered or missing: its hash is {found}, that in manifest.jsonl {expected}", path.display())]
+    #[error("{} is altered or missing: its hash is {found}, but manifest.jsonl has {expected}", path.display())]
     Altered {
         /// The image.
         path: PathBuf,

@@ -26,7 +26,7 @@ impl Metadata {
             .find_map(|scheme| self.license.strip_prefix(scheme));
         if address.is_none_or(|rest| rest.is_empty() || rest.contains(char::is_whitespace)) {
             return Err(format!(
-                "the licence is {:?}, expected its address, https://…",
+                "the licence is {:?}, expected its URL, https://…",
                 self.license
             ));
         }

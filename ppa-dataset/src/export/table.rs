@@ -24,7 +24,7 @@ pub enum TableError {
     #[error(transparent)]
     Labels(#[from] LabelFileError),
     /// Labels of radiographs that were made again since.
-    #[error("{}: the label of step {step} was given to another radiograph than the one there now; label them again", path.display())]
+    #[error("{}: the label of step {step} is for a radiograph that has since been replaced; label the radiographs again", path.display())]
     Outdated {
         /// `labels.json` of the limb.
         path: PathBuf,

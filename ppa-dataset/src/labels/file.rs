@@ -21,7 +21,7 @@ pub enum LabelFileError {
     #[error(transparent)]
     File(#[from] FileError),
     /// It is not a file of labels.
-    #[error("{} holds no labels: {message}", path.display())]
+    #[error("{} is not a valid label file: {message}", path.display())]
     Parse {
         /// The file.
         path: PathBuf,
@@ -298,7 +298,7 @@ impl<'de> Visitor<'de> for Rows {
                 }));
             }
             if rows.contains_key(&image) {
-                return Err(A::Error::custom(format!("{image} stands there twice")));
+                return Err(A::Error::custom(format!("{image} is listed twice")));
             }
             let labelled = Labelled {
                 row: entry.row,

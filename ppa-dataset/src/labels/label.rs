@@ -129,14 +129,14 @@ pub enum LabelError {
     #[error("{0} has the std {1}, expected 0 to 1")]
     Std(String, f64),
     /// Name and step differ.
-    #[error("{0} has the step {1}, expected that of its name, xray_image_STEP.png")]
+    #[error("{0} has the step {1}, expected the step in its name, xray_image_STEP.png")]
     Step(String, u32),
     /// Beyond the rotations of the layout.
-    #[error("{0} lies at {1} degrees, expected half degrees from 0 to 180")]
+    #[error("{0} is at {1} degrees, expected a multiple of 0.5 from 0 to 180")]
     Angle(String, f64),
     /// Labels of sources that do not go together.
     #[error(
-        "{image} is labelled by {found}, others by {expected}; only readers and one kind of computed labels stand in one file"
+        "{image} is labelled by {found}, others by {expected}; a file can hold labels of readers and computed labels of one kind only"
     )]
     Mixed {
         /// The radiograph.

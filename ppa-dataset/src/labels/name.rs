@@ -13,7 +13,7 @@ pub struct LabelName(String);
 /// A text that cannot name labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} cannot name labels: expected 1 to 40 small letters, digits and hyphens, beginning with a letter"
+    "{0:?} is not a valid name for labels: expected 1 to 40 lowercase letters, digits and hyphens, beginning with a letter"
 )]
 pub struct LabelNameError(String);
 
@@ -77,7 +77,7 @@ mod tests {
             "", "2nd", "-a", "Strict", "a/b", "..", "a.b", "a b", "ä", &longer,
         ] {
             let error = wrong.parse::<LabelName>().unwrap_err().to_string();
-            assert!(error.contains("cannot name labels"), "{error}");
+            assert!(error.contains("is not a valid name for labels"), "{error}");
         }
     }
 }

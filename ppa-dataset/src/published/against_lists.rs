@@ -156,6 +156,6 @@ fn stale_metadata(root: &Path) -> Option<Flaw> {
     let found = sha256_of_file(&table).ok();
     let same =
         found.is_some() && expected.and_then(|file| file["sha256"].as_str()) == found.as_deref();
-    let report = "croissant.json describes another manifest.csv than the one there now: run ppa export metadata again";
+    let report = "croissant.json describes a manifest.csv that has since changed: run ppa export metadata again";
     (!same).then(|| Flaw::Metadata(report.to_owned()))
 }

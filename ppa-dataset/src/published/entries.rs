@@ -47,7 +47,7 @@ pub(super) fn labels(
         if let Err(expected) = sources.take(entry.label_source) {
             let found = name_of(entry.label_source);
             return Err(wrong(format!(
-                "the label comes from {found}, those before it from {expected}"
+                "the label comes from {found}, but earlier ones from {expected}"
             )));
         }
         if !(1.0..=3.0).contains(&entry.label) {
@@ -115,7 +115,7 @@ pub(super) fn rois(
 fn one_number(entry: Option<u32>, key: Option<u32>) -> Result<u32, String> {
     match (entry, key) {
         (Some(entry), Some(key)) if entry != key => Err(format!(
-            "the entry is of pose {entry}, its key of pose {key}"
+            "the entry is for pose {entry}, but its key is for pose {key}"
         )),
         (Some(number), _) | (None, Some(number)) => Ok(number),
         (None, None) => Err("neither key nor entry gives the number of the pose".to_owned()),
@@ -153,7 +153,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for UniqueKeys<T> {
                 let mut entries = BTreeMap::new();
                 while let Some((key, value)) = map.next_entry::<String, T>()? {
                     if entries.contains_key(&key) {
-                        let text = format!("the entry {key:?} stands there twice");
+                        let text = format!("the entry {key:?} is listed twice");
                         return Err(serde::de::Error::custom(text));
                     }
                     entries.insert(key, value);

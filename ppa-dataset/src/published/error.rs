@@ -19,7 +19,7 @@ pub enum PublishedError {
     #[error("{} holds no images of patients: expected folders patient_0, patient_1, … or patient_1_l, patient_1_r, …", .0.display())]
     NoSubjects(PathBuf),
     /// Folders of both layouts.
-    #[error("{} is of the specimen layout, {} of the synthetic one; one folder holds one layout", specimen.display(), synthetic.display())]
+    #[error("{} belongs to the specimen layout, {} to the synthetic one; a dataset must have a single layout", specimen.display(), synthetic.display())]
     TwoLayouts {
         /// A folder `patient_N_l` or `patient_N_r`.
         specimen: PathBuf,
@@ -35,7 +35,7 @@ pub enum PublishedError {
         expected: &'static str,
     },
     /// Two folders of one person or limb, as `patient_1` and `patient_01`.
-    #[error("{} is another name of {}", second.display(), first.display())]
+    #[error("{} is another name for {}", second.display(), first.display())]
     SameSubject {
         /// The folder as it should be called.
         first: PathBuf,
@@ -52,7 +52,7 @@ pub enum PublishedError {
     },
     /// Labels of radiographs that were made again since.
     #[error(
-        "{}: labels of other radiographs than those there now: {}, the first of step {step}; make them again \
+        "{}: {} of radiographs that have since been replaced, the first at step {step}; create them again \
          (`ppa label auto` or `ppa label import`) or remove the file",
         path.display(), ppa_core::text::count(*count, "label")
     )]

@@ -13,7 +13,7 @@ pub enum Flaw {
     Image(String),
     /// A region that reaches beyond its image.
     #[error(
-        "{file} has {width} x {height} pixels, its region reaches to column {} and row {}",
+        "{file} has {width} x {height} pixels, but its region reaches to column {} and row {}",
         roi.x_start.saturating_add(roi.size), roi.y_start.saturating_add(roi.size)
     )]
     RoiOutside {
@@ -27,7 +27,7 @@ pub enum Flaw {
         roi: RoiRow,
     },
     /// A pose that only one camera saw, of a limb that both did.
-    #[error("{file} has no counterpart of the other camera")]
+    #[error("{file} has no counterpart from the other camera")]
     OneCamera {
         /// The only depth image.
         file: String,
@@ -50,7 +50,7 @@ pub enum Flaw {
     #[error("{0}")]
     Unpaired(Unpaired),
     /// Labels of radiographs that were made again since.
-    #[error("limb {} of patient {}: labels of other radiographs than those there now: {}, the first of step {step}",
+    #[error("limb {} of patient {}: {} of radiographs that have since been replaced, the first at step {step}",
         limb.side_letter(), limb.patient, ppa_core::text::count(*count, "label"))]
     Outdated {
         /// The limb.
@@ -61,7 +61,7 @@ pub enum Flaw {
         count: usize,
     },
     /// An image that is not the one in `manifest.jsonl`.
-    #[error("{file} is altered: its hash is {found}, that in manifest.jsonl {expected}")]
+    #[error("{file} is altered: its hash is {found}, but manifest.jsonl has {expected}")]
     Altered {
         /// The image.
         file: String,
@@ -71,21 +71,21 @@ pub enum Flaw {
         expected: String,
     },
     /// A list that is not the one in `checksums.sha256`.
-    #[error("{file} is missing or altered: its hash is not that in checksums.sha256")]
+    #[error("{file} is missing or altered: its hash does not match the one in checksums.sha256")]
     List {
         /// The list.
         file: String,
     },
     /// Labels, grades or a split that are not those in `labels.sha256`.
     #[error(
-        "{file} is missing or altered: its hash is not that in labels.sha256, which you may remove if the change is yours"
+        "{file} is missing or altered: its hash does not match the one in labels.sha256, which you may remove if you made the change"
     )]
     Labels {
         /// The file.
         file: String,
     },
     /// `checksums.sha256` or `labels.sha256` is not as it was written.
-    #[error("{file} is altered: its hash is not that in its last line")]
+    #[error("{file} is altered: its hash does not match the one in its last line")]
     Checksums {
         /// Which of both.
         file: &'static str,

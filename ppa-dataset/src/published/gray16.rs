@@ -15,7 +15,7 @@ pub enum ImageFileError {
     #[error(transparent)]
     File(#[from] FileError),
     /// It is no PNG, or not a whole one.
-    #[error("{} is not a whole PNG", path.display())]
+    #[error("{} is not a complete PNG file", path.display())]
     Damaged {
         /// The image.
         path: PathBuf,

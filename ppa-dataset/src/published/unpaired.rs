@@ -40,11 +40,11 @@ pub enum Unpaired {
 impl fmt::Display for Unpaired {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Radiograph { file, .. } => write!(f, "{file} is of a pose without depth images"),
+            Self::Radiograph { file, .. } => write!(f, "{file} shows a pose without depth images"),
             Self::Label { list, pose } => {
                 write!(
                     f,
-                    "{list} has a label of pose {pose}, which has no depth image"
+                    "{list} has a label for pose {pose}, which has no depth image"
                 )
             }
             Self::Region { list, pose, camera } => write!(

@@ -19,18 +19,14 @@ fn shares_are_rounded_to_whole_persons() {
         [1, 1, 1]
     );
     for (patients, wrong, part) in [
-        (
-            2,
-            shares(&[("train", 0.9), ("test", 0.1)]),
-            "test stays empty",
-        ),
+        (2, shares(&[("train", 0.9), ("test", 0.1)]), "test is empty"),
         (
             9,
             shares(&[("train", 0.9), ("test", 0.0)]),
             "share of test is 0",
         ),
         (9, shares(&[("train", f64::NAN)]), "share of train is NaN"),
-        (9, shares(&[("train", 1.0), ("train", 1.0)]), "named twice"),
+        (9, shares(&[("train", 1.0), ("train", 1.0)]), "given twice"),
         (9, shares(&[]), "no part"),
     ] {
         let said = counts(patients, &wrong).unwrap_err().to_string();
@@ -69,7 +65,10 @@ fn a_person_in_two_parts_is_named() {
     assert_eq!(Split::names(folder.path()).unwrap(), ["mine"]);
     split.check(&[0, 3, 7]).unwrap();
     let said = |patients: &[u32]| split.check(patients).unwrap_err().to_string();
-    assert_eq!(said(&[0, 3, 5, 7]), "patient 5 is in no part of the split");
+    assert_eq!(
+        said(&[0, 3, 5, 7]),
+        "patient 5 is not in any part of the split"
+    );
     assert_eq!(
         said(&[0, 3]),
         "patient 7 of part test is not in the dataset"

@@ -136,7 +136,7 @@ fn what_cannot_be_converted_leaves_nothing() {
     let error = convert(&read, &folder.path().join("out"), Flexion::Min, &GO_ON).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
     assert!(
-        cause.contains("xray_image_400.png lies at 200 degrees"),
+        cause.contains("xray_image_400.png is at 200 degrees"),
         "{error}: {cause}"
     );
     let left: Vec<_> = fs::read_dir(folder.path())

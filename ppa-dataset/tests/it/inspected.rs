@@ -30,7 +30,7 @@ fn each_flaw_is_reported_with_its_file() {
     let file = "patient_0/depth/r/orig/depth_cam_left_45.5.png";
     type Break<'a> = &'a dyn Fn(&Tree);
     let broken: [(&str, Break); 6] = [
-        ("is not a whole PNG", &|tree| {
+        ("is not a complete PNG file", &|tree| {
             let bytes = fs::read(tree.path(file)).unwrap();
             fs::write(tree.path(file), &bytes[..bytes.len() / 2]).unwrap();
         }),
@@ -38,7 +38,7 @@ fn each_flaw_is_reported_with_its_file() {
             image::RgbImage::new(12, 9).save(tree.path(file)).unwrap();
         }),
         (
-            "has 12 x 9 pixels, its region reaches to column 13 and row 12",
+            "has 12 x 9 pixels, but its region reaches to column 13 and row 12",
             &|tree| {
                 let roi = "\"camera\": \"cam_left\",\n    \"image_number\": 91,\n    \"size\": 5";
                 tree.edit(
@@ -56,7 +56,7 @@ fn each_flaw_is_reported_with_its_file() {
                 &roi.replace("size\": 5", "size\": 4294967295"),
             );
         }),
-        ("has no counterpart of the other camera", &|tree| {
+        ("has no counterpart from the other camera", &|tree| {
             fs::remove_file(tree.path("patient_0/depth/r/orig/depth_cam_right_45.5.png")).unwrap();
         }),
         ("are the same image, but of different persons", &|tree| {
@@ -101,15 +101,16 @@ fn files_of_no_depth_image_are_reported() {
     assert_eq!(
         flaws(&tree),
         [
-            format!("{radiograph} is of a pose without depth images"),
-            "patient_0/labels/r/labels.json has a label of pose 180, which has no depth image".to_owned(),
+            format!("{radiograph} shows a pose without depth images"),
+            "patient_0/labels/r/labels.json has a label for pose 180, which has no depth image".to_owned(),
             "patient_0/labels/r/roi_depth.json has a region of pose 180 for cam_left, which has no depth image of it".to_owned(),
             "patient_0/labels/r/roi_depth.json has a region of pose 180 for cam_right, which has no depth image of it".to_owned(),
         ]
     );
     fs::write(tree.path(radiograph), "no picture").unwrap();
     let report = flaws(&tree);
-    let damaged = |flaw: &String| flaw.contains(radiograph) && flaw.contains("not a whole PNG");
+    let damaged =
+        |flaw: &String| flaw.contains(radiograph) && flaw.contains("not a complete PNG file");
     assert!(report.iter().any(damaged), "{report:?}");
 
     let tree = Tree::specimen();
@@ -120,7 +121,7 @@ fn files_of_no_depth_image_are_reported() {
     }
     let report = flaws(&tree);
     assert_eq!(report.len(), 4, "{report:?}");
-    let expected = format!("{folder}/xray/xray_0.png is of a pose without depth images");
+    let expected = format!("{folder}/xray/xray_0.png shows a pose without depth images");
     assert_eq!(report[0], expected);
 }
 
@@ -152,8 +153,7 @@ fn tallies_scans_and_labels_are_compared_with_the_lists() {
     assert_eq!(flaws(&tree), unlisted(&tree));
     Published::read(tree.root()).unwrap();
     tree.edit(labels, &bound(&hash), &bound("0123"));
-    let outdated =
-        "labels of other radiographs than those there now: 1 label, the first of step 91";
+    let outdated = "1 label of radiographs that have since been replaced, the first at step 91";
     assert!(flaws(&tree).iter().any(|flaw| flaw.contains(outdated)));
     let refused = Published::read(tree.root()).unwrap_err().to_string();
     assert!(

@@ -51,7 +51,7 @@ fn names_that_fit_no_layout_are_reported() {
         ),
         (
             "patient_00/depth/l/orig/depth_cam_left_18.0.png",
-            ["patient_00", "another name of"],
+            ["patient_00", "another name for"],
         ),
         (
             "patient_07/depth/l/orig/depth_cam_left_18.0.png",
@@ -63,7 +63,7 @@ fn names_that_fit_no_layout_are_reported() {
         ),
         (
             "patient_1_l/min/data/dataset/xray/xray_0.png",
-            ["patient_1_l", "one folder holds one layout"],
+            ["patient_1_l", "a dataset must have a single layout"],
         ),
     ] {
         let tree = Tree::synthetic();
@@ -85,7 +85,7 @@ fn names_that_fit_no_layout_are_reported() {
         ),
         (
             "patient_01_l/min/data/dataset/xray/xray_0.png",
-            ["patient_01_l", "another name of"],
+            ["patient_01_l", "another name for"],
         ),
     ] {
         let tree = Tree::specimen();
@@ -142,7 +142,7 @@ fn entries_edited_by_hand_are_reported() {
             rois,
             "\"image_number\": 91",
             "\"image_number\": 92",
-            ["pose 92", "key of pose 91"],
+            ["pose 92", "key is for pose 91"],
         ),
         (
             rois,
@@ -186,13 +186,13 @@ fn entries_of_a_specimen_edited_by_hand_are_reported() {
             &labels,
             "\"image_number\": 10",
             "\"image_number\": 0",
-            ["pose 0", "key of pose 10"],
+            ["pose 0", "key is for pose 10"],
         ),
         (
             &labels,
             "xray_10",
             "xray_0",
-            ["labels.json", "stands there twice"],
+            ["labels.json", "is listed twice"],
         ),
         (
             &rois,
@@ -222,7 +222,7 @@ fn images_that_are_damaged_or_of_other_pixels_are_reported() {
         fs::write(&path, &bytes[..length]).unwrap();
         assert_says(
             &chain(&GrayImage16::read(&path).unwrap_err()),
-            &[name, "not a whole PNG"],
+            &[name, "not a complete PNG file"],
         );
     }
     image::GrayImage::new(12, 9).save(&path).unwrap();

@@ -50,12 +50,12 @@ pub enum JointSpaceError {
     NoGutter(Gutter),
     /// No direction of the beam opens a gutter.
     #[error(
-        "the {0} gutter is open from no direction around the limb: the bones may not be separated"
+        "the {0} gutter is not open from any direction around the limb: the bones may not be separated"
     )]
     NeverOpen(Gutter),
     /// No direction of the beam opens all of them.
     #[error(
-        "all three gutters are open at once from no direction around the limb: the worst one never shows more than \
+        "the three gutters are not open at once from any direction around the limb: the worst one never shows more than \
          {0:.2} of what it could, expected at least {LEAST_ATTAINABLE}"
     )]
     NeverTogether(f64),

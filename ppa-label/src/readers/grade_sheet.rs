@@ -25,7 +25,7 @@ pub enum GradeSheetError {
     #[error("a grade is {0}, expected 1, 1.5, 2, 2.5 or 3")]
     Grade(f64),
     /// A picture that is not of the key.
-    #[error("{0} is not a picture of the key")]
+    #[error("{0} is not a picture in the key")]
     Unknown(String),
     /// The file is another reader's.
     #[error("{} holds grades of {found}, expected those of {expected}", path.display())]

@@ -40,7 +40,7 @@ pub enum GradeTablesError {
 #[non_exhaustive]
 pub enum GradeRowError {
     /// Off the scale.
-    #[error("{reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3")]
+    #[error("{reader} grades {image} as {grade}, expected 1, 1.5, 2, 2.5 or 3")]
     Grade {
         /// The reader.
         reader: String,
@@ -50,7 +50,7 @@ pub enum GradeRowError {
         grade: f64,
     },
     /// A reader's name that spreadsheet programs would run.
-    #[error("a reader is called {0:?}, which spreadsheets take for a formula")]
+    #[error("the reader's name is {0:?}, which spreadsheets interpret as a formula")]
     Formula(String),
 }
 

@@ -21,7 +21,7 @@ pub enum ImportError {
     #[error("there are no grades to import")]
     Empty,
     /// Off the scale.
-    #[error("{}: {reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
+    #[error("{}: {reader} grades {image} as {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
     Grade {
         /// The file.
         path: PathBuf,
@@ -33,7 +33,7 @@ pub enum ImportError {
         grade: f64,
     },
     /// A reader's name that spreadsheet programs would run.
-    #[error("{}: a reader is called {reader:?}, which spreadsheets take for a formula; expected a name that does not begin with = + - @, a tab or a carriage return", path.display())]
+    #[error("{}: the reader's name is {reader:?}, which spreadsheets interpret as a formula; expected a name that does not begin with = + - @, a tab or a carriage return", path.display())]
     Formula {
         /// The file.
         path: PathBuf,
@@ -41,7 +41,7 @@ pub enum ImportError {
         reader: String,
     },
     /// A picture that neither key nor dataset know.
-    #[error("{}: {image} is neither a picture of the key nor a radiograph of the dataset", path.display())]
+    #[error("{}: {image} is neither a picture in the key nor a radiograph in the dataset", path.display())]
     Unknown {
         /// The file.
         path: PathBuf,
@@ -49,11 +49,13 @@ pub enum ImportError {
         image: String,
     },
     /// The dataset has changed since the key was made.
-    #[error("{0} is not the radiograph that the readers saw: its hash is not that of the key")]
+    #[error(
+        "{0} is not the radiograph that the readers saw: its hash does not match the one in the key"
+    )]
     Changed(String),
     /// The dataset has changed since a grade was imported.
     #[error(
-        "{}: {reader} graded another radiograph {image}: its hash was {found}, that in the manifest is {expected}; move the file \
+        "{}: {reader} graded a different version of {image}: its hash was {found}, but the manifest has {expected}; move the file \
          away to start again",
         path.display()
     )]
@@ -83,8 +85,8 @@ pub enum ImportError {
     },
     /// Grades that are there would be lost.
     #[error(
-        "{} holds {reader}'s grade {grade} of {image}, which none of the given files does: give that file as well or, where the \
-         reader has changed the grade, move it away and give the files of all readers",
+        "{} holds {reader}'s grade {grade} of {image}, but none of the given files does: give the missing file as well or, \
+         if the reader has changed the grade, move this one away and give the files of all readers",
         path.display()
     )]
     Lost {
@@ -99,7 +101,7 @@ pub enum ImportError {
     },
     /// Labels of readers that are there would be lost.
     #[error(
-        "{} holds readers' labels that do not follow from grades.csv; move it away, or give their grades, before others take their place",
+        "{} holds readers' labels that do not follow from grades.csv; move it away or give their grades before other labels replace them",
         .0.display()
     )]
     OtherLabels(PathBuf),

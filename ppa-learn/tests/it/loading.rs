@@ -206,7 +206,7 @@ fn what_is_missing_or_of_another_size_is_named() {
     );
     fs::write(&odd, "no image").unwrap();
     let error = read().unwrap_err().to_string();
-    assert!(error.ends_with("is not a whole PNG"), "{error}");
+    assert!(error.ends_with("is not a complete PNG file"), "{error}");
     let grey = image::GrayImage::from_pixel(60, 60, image::Luma([9]));
     grey.save(&odd).unwrap();
     let error = read().unwrap_err().to_string();

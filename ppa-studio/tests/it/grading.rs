@@ -187,7 +187,7 @@ fn what_cannot_be_graded_is_refused_in_a_sentence() {
         (grade(first, "Anna", 1.2), "a grade is 1.2"),
         (
             grade(&json!("0123456789"), "Anna", 1.0),
-            "not a picture of the key",
+            "not a picture in the key",
         ),
     ] {
         let answer = browser.post("/api/grading/grade", &body);

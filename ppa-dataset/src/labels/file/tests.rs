@@ -109,7 +109,7 @@ fn what_is_no_label_is_named() {
     assert!(
         read(&twice)
             .unwrap_err()
-            .contains("xray_image_36.png stands there twice")
+            .contains("xray_image_36.png is listed twice")
     );
     let beyond = LabelRow {
         label: 1.0,

@@ -24,10 +24,10 @@ pub enum ScaleError {
         message: String,
     },
     /// Openness out of order.
-    #[error("thresholds of openness are {}, expected four falling numbers from 0 to 1", ppa_core::text::numbers(*.0))]
+    #[error("thresholds of openness are {}, expected four decreasing numbers from 0 to 1", ppa_core::text::numbers(*.0))]
     Falling([f64; 4]),
     /// What may be hidden out of order.
-    #[error("{key} is {}, expected four rising numbers from 0 to {most}", ppa_core::text::numbers(*found))]
+    #[error("{key} is {}, expected four increasing numbers from 0 to {most}", ppa_core::text::numbers(*found))]
     Rising {
         /// The key.
         key: &'static str,

@@ -129,17 +129,17 @@ mod tests {
             (
                 Strict,
                 "at_least = [0.4, 0.4, 0.2, 0.1]",
-                "expected four falling",
+                "expected four decreasing",
             ),
             (
                 Strict,
                 "at_least = [1.1, 0.4, 0.2, 0.1]",
-                "expected four falling",
+                "expected four decreasing",
             ),
             (
                 Strict,
                 "at_least = [0.9, 0.4, 0.2, nan]",
-                "expected four falling",
+                "expected four decreasing",
             ),
             (
                 Strict,
@@ -159,17 +159,17 @@ mod tests {
             (
                 Graded,
                 "hidden_mm = [1, 1, 2, 3]",
-                "hidden_mm is 1, 1, 2, 3, expected four rising",
+                "hidden_mm is 1, 1, 2, 3, expected four increasing",
             ),
             (
                 Graded,
                 "hidden_mm = [-1, 1, 2, 3]",
-                "rising numbers from 0 to 50",
+                "increasing numbers from 0 to 50",
             ),
             (
                 Graded,
                 "lost_contrast = [0.1, 0.2, 0.3, 1.1]",
-                "rising numbers from 0 to 1",
+                "increasing numbers from 0 to 1",
             ),
             (
                 Graded,
@@ -181,9 +181,6 @@ mod tests {
             assert!(said.contains(expected), "{said}");
         }
         let error = "open".parse::<ScaleName>().unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "there is no scale \"open\", expected graded or strict"
-        );
+        assert_eq!(error, "unknown scale \"open\", expected graded or strict");
     }
 }

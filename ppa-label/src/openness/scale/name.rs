@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// A name that no scale has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no scale {0:?}, expected graded or strict")]
+#[error("unknown scale {0:?}, expected graded or strict")]
 pub struct UnknownScale(String);
 
 /// A scale of computed labels.
