@@ -34,7 +34,7 @@ pub enum Problem {
     },
     /// A run was killed while it put the files of a pose in their place.
     #[error(
-        "{pose_job} is replaced only in part, because the run was interrupted; the next run completes it"
+        "{pose_job} is only partly replaced because the run was interrupted; the next run completes it"
     )]
     Interrupted {
         /// The pose.
@@ -53,7 +53,7 @@ pub enum Problem {
         file: String,
     },
     /// An image has other bytes than those that were written.
-    #[error("{file} is altered: its hash is not the recorded one")]
+    #[error("{file} is altered: its hash does not match the recorded one")]
     Altered {
         /// Path from the dataset's root.
         file: String,

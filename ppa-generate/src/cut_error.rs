@@ -39,8 +39,8 @@ impl fmt::Display for PoseImage {
 /// Regions of which more is cut than the plan allows.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "limb {} of patient {}: the field of view of the scan cuts off {}; raise the limit in the plan, take another camera or other rotations, \
-     or a scan that shows more of the limb",
+    "limb {} of patient {}: the field of view of the scan cuts off {}; raise the limit in the plan, use another camera, \
+     other rotations, or a scan that shows more of the limb",
     limb.side_letter(), limb.patient, listed(worst)
 )]
 pub struct CutError {

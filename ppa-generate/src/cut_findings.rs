@@ -27,8 +27,8 @@ pub(crate) fn cuts(walls: &CutWalls, skin: &Mesh, landmarks: &Landmarks) -> Vec<
             code: FindingCode::CutLimb,
             severity: Severity::Caution,
             text: format!(
-                "the field of view cuts the limb at its face {}: {:.0} mm² around {x:.0}, {y:.0}, {z:.0} mm, {:.0} mm from the joint; what is \
-                 missing there is missing in depth images and radiographs",
+                "the field of view cuts the limb at its face {}: {:.0} mm² around {x:.0}, {y:.0}, {z:.0} mm, {:.0} mm from \
+                 the joint; what is missing there is also missing in depth images and radiographs",
                 wall.face,
                 wall.area_mm2,
                 (wall.centre - joint).norm()

@@ -46,12 +46,12 @@ pub enum FolderError {
         asked: Part,
     },
     /// The folder holds something else.
-    #[error("{} holds no dataset that ppa generate began", .0.display())]
+    #[error("{} holds no dataset started by ppa generate", .0.display())]
     NotADataset(PathBuf),
     /// The folder holds files of a dataset, but not the records that describe them.
     #[error(
-        "{} holds {found}, but not the folder .ppa with the records of its poses, as a dataset that was copied in part; \
-         copy .ppa as well, or choose another folder",
+        "{} holds {found}, but not the folder .ppa with the records of its poses; if the dataset was copied, copy .ppa as \
+         well, or choose another folder",
         root.display()
     )]
     WithoutRecords {

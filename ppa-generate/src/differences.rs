@@ -19,7 +19,11 @@ impl fmt::Display for KeyDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = |value: &Option<String>| value.as_deref().map_or("absent".to_owned(), short);
         let (there, here) = (value(&self.there), value(&self.here));
-        write!(f, "{} is {there} there and {here} here", self.key)
+        write!(
+            f,
+            "{} is {there} in the dataset and {here} in this run",
+            self.key
+        )
     }
 }
 
@@ -133,14 +137,14 @@ mod tests {
             let found = differences(a, b);
             found.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
-        let kvp = "settings.xray.kvp is 60 there and 70 here";
-        let code = "settings.code is 1 there and 2 here";
+        let kvp = "settings.xray.kvp is 60 in the dataset and 70 in this run";
+        let code = "settings.code is 1 in the dataset and 2 in this run";
         assert_eq!(between(&one, &description(70.0, 2, &[0])), [kvp, code]);
         assert_eq!(between(&one, &description(60.0, 2, &[0])), [code]);
         let grown = between(&one, &description(60.0, 1, &[0, 4]));
         assert_eq!(grown.len(), 1, "{grown:?}");
         assert!(
-            grown[0].starts_with("limbs.patient_4_r is absent there and {"),
+            grown[0].starts_with("limbs.patient_4_r is absent in the dataset and {"),
             "{grown:?}"
         );
     }

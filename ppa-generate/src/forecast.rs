@@ -36,7 +36,7 @@ pub enum ForecastError {
     Fraction(f64),
     /// The images will not fit.
     #[error(
-        "the plan's images need {needed} more bytes in {}, where {free} are free",
+        "the plan's images need {needed} more bytes in {}, but only {free} are free",
         root.display()
     )]
     NoRoom {
@@ -287,7 +287,7 @@ mod tests {
         assert!(fits(600, Some(600)).is_ok() && fits(600, None).is_ok());
         let said = fits(600, Some(599)).unwrap_err().to_string();
         assert!(
-            said.contains("600 more bytes in dataset, where 599"),
+            said.contains("600 more bytes in dataset, but only 599"),
             "{said}"
         );
     }

@@ -75,7 +75,7 @@ pub enum MergeError {
         pose_job: String,
     },
     /// Poses that no shard holds.
-    #[error("no shard holds {pose_job}; missing are {missing} of {}", ppa_core::text::count(*pose_jobs, "pose"))]
+    #[error("no shard holds {pose_job}; {missing} of {} are missing", ppa_core::text::count(*pose_jobs, "pose"))]
     Hole {
         /// The first of them.
         pose_job: String,
@@ -101,7 +101,7 @@ pub enum MergeError {
         pose_job: String,
     },
     /// An image of a shard is not the one that was made.
-    #[error("{} is altered: its hash is not the recorded one", .0.display())]
+    #[error("{} is altered: its hash does not match the recorded one", .0.display())]
     Altered(PathBuf),
 }
 

@@ -40,8 +40,9 @@ impl Planned {
             serde_json::from_str(&text).map_err(|e| FileError::at("parse", path)(e.into()))?;
         let sealed = matches!(seal, Opened::Sealed(_));
         if !sealed && (planned.version > 1 || seal == Opened::Broken) {
-            let damaged =
-                std::io::Error::other("it is damaged: its hash is not the one it carries");
+            let damaged = std::io::Error::other(
+                "it is damaged: its hash does not match the one stored in it",
+            );
             return Err(FileError::at("use", path)(damaged));
         }
         planned

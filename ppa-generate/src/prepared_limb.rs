@@ -19,7 +19,7 @@ pub enum PrepareError {
     #[error(transparent)]
     Read(#[from] ppa_ct::ReadError),
     /// A chosen series that a case cannot name: cases hold no UID.
-    #[error("the chosen series in {} has no number of its own; put its files into a folder of their own", .0.display())]
+    #[error("the chosen series in {} has no unique number; put its files into a separate folder", .0.display())]
     SeriesWithoutNumber(PathBuf),
     /// No limb was found in it.
     #[error(transparent)]
@@ -146,8 +146,8 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
     let [x, y, z] = chosen.centre_mm.map(ppa_core::text::number);
     let millilitres = beside.core_mm3 * 1e-3;
     let text = format!(
-        "the limb around {x:.0}, {y:.0}, {z:.0} mm was taken, but towards the patient's {name} lies another one, cut by the \
-         image ({millilitres:.0} ml with little bone): is it the {other} limb that was taken? (--inside takes the other)"
+        "the limb around {x:.0}, {y:.0}, {z:.0} mm was selected, but another one, cut off by the image, lies towards the \
+         patient's {name} ({millilitres:.0} ml with little bone): was the {other} limb selected? (--inside selects the other)"
     );
     Some(Finding {
         code: FindingCode::OtherLimbOnSide,
@@ -168,7 +168,8 @@ fn bodies_kept(report: &LimbReport) -> Option<Finding> {
         code: FindingCode::BodyKept,
         severity: Severity::Note,
         text: format!(
-            "{bodies} of {millilitres:.0} ml (solid core) belong to the limb, as surface.kept of the case says: skin, placement, body shapes and radiographs include them"
+            "surface.kept of the case adds {bodies} of {millilitres:.0} ml (solid core) to the limb: skin, placement, body \
+             shapes and radiographs include them"
         ),
         value: Some(1e3 * millilitres),
         place_mm: Some(largest.point_mm()),
@@ -185,7 +186,8 @@ fn part_removed(report: &LimbReport, settings: &LimbSettings) -> Option<Finding>
         code: FindingCode::PartRemoved,
         severity: Severity::Caution,
         text: format!(
-            "{millilitres:.0} ml of tissue in {balls} are removed, as surface.removed of the case says: where that cuts the limb, its surface is not skin"
+            "surface.removed of the case removes {millilitres:.0} ml of tissue in {balls}: where that cuts the limb, its \
+             surface is not skin"
         ),
         value: Some(report.removed_mm3),
         place_mm: Some(largest.centre_mm),
@@ -201,7 +203,7 @@ fn several_limbs(report: &LimbReport) -> Option<Finding> {
         code: FindingCode::SeveralLimbs,
         severity: Severity::Caution,
         text: format!(
-            "the scan shows {alike} limbs; the one around {x:.0}, {y:.0}, {z:.0} mm was taken (--inside takes another)"
+            "the scan shows {alike} limbs; the one around {x:.0}, {y:.0}, {z:.0} mm was selected (--inside selects another)"
         ),
         value: Some(alike as f64),
         place_mm: Some(chosen.point_mm()),

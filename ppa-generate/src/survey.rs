@@ -47,7 +47,7 @@ impl fmt::Display for DatasetDiffers {
                 .collect();
             match self.keys.len() {
                 0 => keys.push(
-                    "other than its dataset.json states, as a run with --replace was interrupted"
+                    "not those in its dataset.json, because a run with --replace was interrupted"
                         .to_owned(),
                 ),
                 n if n > TOLD => keys.push(format!("{} more keys", n - TOLD)),
@@ -68,7 +68,7 @@ impl fmt::Display for DatasetDiffers {
         }
         if let Some((first, n)) = &self.unrecorded {
             parts.push(format!(
-                "{}, the first {first}, {} in none of its records",
+                "{}, the first {first}, {} not in any of its records",
                 count(*n, "image"),
                 are(*n)
             ));

@@ -217,7 +217,7 @@ fn a_run_makes_only_what_is_missing_or_damaged() {
     let said = refused.to_string();
     assert!(
         said.contains("2 of its 2 poses")
-            && said.contains("settings.xray.kvp is 60.0 there and 70.0 here"),
+            && said.contains("settings.xray.kvp is 60.0 in the dataset and 70.0 in this run"),
         "{said}"
     );
     assert!(contents(root.path()) == first, "nothing was changed");

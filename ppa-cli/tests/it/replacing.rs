@@ -36,7 +36,7 @@ fn another_plan_changes_a_dataset_only_when_asked_to() {
     let said = fail(here, "generate other.toml --out data --progress quiet");
     for words in [
         "5 of its 5 poses",
-        "settings.xray.kvp is 60.0 there and 70.0 here",
+        "settings.xray.kvp is 60.0 in the dataset and 70.0 in this run",
         "--replace",
         "--out",
     ] {
@@ -63,7 +63,7 @@ fn another_plan_changes_a_dataset_only_when_asked_to() {
     );
     let said = fail(here, "merge data --out fresh");
     assert!(
-        said.contains("settings.xray.kvp is 70.0 there and 60.0 here"),
+        said.contains("settings.xray.kvp is 70.0 in the dataset and 60.0 in this run"),
         "{said}"
     );
     killed_while_replacing(here);

@@ -24,7 +24,7 @@ pub(super) fn findings(landmarks: &Landmarks, shaft: Option<&Shaft>) -> Vec<Find
         let [from, to] = shaft.range_mm;
         let advice = match landmarks.axis_source {
             AxisSource::Limb => {
-                " (the axis passes through centres of the skin; --axis-source bone takes those of the bone)"
+                " (the axis passes through centres of the skin; --axis-source bone uses those of the bone)"
             }
             AxisSource::Bone | AxisSource::Given => "",
         };
@@ -35,7 +35,7 @@ pub(super) fn findings(landmarks: &Landmarks, shaft: Option<&Shaft>) -> Vec<Find
             shaft.off_axis_deg,
             format!(
                 "the axis of rotation is inclined by {:.1} degrees to the bone's shaft, seen from {from:.0} to {to:.0} mm \
-                 proximal of the joint, expected at most {CAUTION_DEG:.0}{advice}",
+                 proximal to the joint, expected at most {CAUTION_DEG:.0}{advice}",
                 shaft.off_axis_deg
             ),
         ));
@@ -59,8 +59,8 @@ pub(super) fn findings(landmarks: &Landmarks, shaft: Option<&Shaft>) -> Vec<Find
             Severity::Note,
             end_mm,
             format!(
-                "the regions that give the axis end {end_mm:.0} mm proximal of the joint, {CALF_END_MM:.0} mm where a \
-                 scan is long enough"
+                "the regions that define the axis end {end_mm:.0} mm proximal to the joint; in a scan that is long enough, \
+                 they end at {CALF_END_MM:.0} mm"
             ),
         ));
     }

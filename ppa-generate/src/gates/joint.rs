@@ -56,7 +56,7 @@ pub(super) fn findings(
                 Severity::Caution,
                 angle_deg,
                 format!(
-                    "the anterior direction is {angle_deg:.0} degrees from the patient's own in the scan, expected at most \
+                    "the anterior direction is {angle_deg:.0} degrees from that of the patient in the scan, expected at most \
                      90: at angle 0 the limb lies on its front"
                 ),
             )),
@@ -99,7 +99,7 @@ fn joint_beside_axis(place: [f64; 3], aside_mm: f64) -> Option<Finding> {
             Severity::Caution,
             aside_mm,
             format!(
-                "the joint lay {aside_mm:.1} mm beside the given axis; the limb turns about the point of the axis nearest to it"
+                "the joint was {aside_mm:.1} mm away from the given axis; the limb rotates about the point of the axis nearest to it"
             ),
         )
     })
@@ -128,11 +128,11 @@ fn knee_axis(place: [f64; 3], axis: KneeAxis) -> Option<Finding> {
     let text = match axis {
         KneeAxis::Tibia => return None,
         KneeAxis::Femur => {
-            "the axis runs along the femur's shaft, which leans from the leg's long axis by about 6 degrees: the scan shows too \
+            "the axis runs along the femur's shaft, which is inclined to the leg's long axis by about 6 degrees: the scan shows too \
              little of the tibia"
         }
         KneeAxis::Both => {
-            "the axis runs through tibia and femur: the scan shows too little of either shaft to give it alone"
+            "the axis runs through tibia and femur: the scan shows too little of either shaft to define it alone"
         }
     };
     Some(doubt(place, FindingCode::KneeAxis, text))
@@ -151,7 +151,7 @@ fn off_ankle(place: [f64; 3], depth_hu: f64, joint_above_mm: f64) -> Option<Find
             Severity::Caution,
             joint_above_mm,
             format!(
-                "the joint lies {distance_mm:.0} mm {towards} of the ankle that the scan shows (a gap {depth_hu:.0} HU darker \
+                "the joint lies {distance_mm:.0} mm {towards} to the ankle that the scan shows (a gap {depth_hu:.0} HU darker \
                  than the bone on either side)"
             ),
         )
@@ -167,7 +167,8 @@ fn beside_ankle(landmarks: &Landmarks) -> Option<Finding> {
     let aside_mm = off.cross(&axis).norm();
     let is_doubted = landmarks.limb == LimbKind::LowerLeg && aside_mm > BESIDE_ANKLE_MM;
     is_doubted.then(|| {
-        let text = format!("the joint lies {aside_mm:.0} mm beside the ankle that the scan shows");
+        let text =
+            format!("the joint lies {aside_mm:.0} mm to one side of the ankle that the scan shows");
         let (code, severity) = (FindingCode::JointOffAnkle, Severity::Caution);
         at(place, code, severity, aside_mm, text)
     })
@@ -201,7 +202,7 @@ fn no_joint(volume: &Volume, report: &LimbReport, landmarks: &Landmarks) -> Opti
             FindingCode::NoJoint,
             Severity::Severe,
             off_mm,
-            "no joint was recognised: the limb turns about the middle of what the scan shows, and regions of interest and \
+            "no joint was recognised: the limb rotates about the middle of what the scan shows, and regions of interest and \
              beam are centred there (--joint gives its centre)"
                 .to_owned(),
         )

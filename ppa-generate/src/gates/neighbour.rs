@@ -38,7 +38,7 @@ pub(super) fn findings(report: &LimbReport, neighbour: Option<&Neighbour>) -> Ve
             code: FindingCode::FusedLimb,
             severity: Severity::Severe,
             text: format!(
-                "a second bone like a tibia lies far from the first, at {x:.0}, {y:.0}, {z:.0} mm: another leg is fused to \
+                "a second tibia-like bone lies far from the first, at {x:.0}, {y:.0}, {z:.0} mm: another leg is fused to \
                  this one (--crop cuts it off)"
             ),
             value: None,
@@ -63,7 +63,7 @@ fn contact(report: &LimbReport) -> Option<Finding> {
         severity,
         contact_cm2,
         format!(
-            "another body touches the limb over {contact_cm2:.1} cm² around {x:.0}, {y:.0}, {z:.0} mm: there the skin is a \
+            "another body touches the limb over {contact_cm2:.1} cm² around {x:.0}, {y:.0}, {z:.0} mm: the skin there is a \
              guess, and a sliver of the other body may be attached"
         ),
     ))

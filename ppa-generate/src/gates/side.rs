@@ -17,7 +17,7 @@ pub(super) fn finding(landmarks: &Landmarks, fibula: Option<&Fibula>) -> Option<
         Severity::Severe,
         fibula.sine,
         format!(
-            "tibia and fibula lie as in a {} leg, but the case is of the {} side: medial rotation would turn this leg laterally \
+            "tibia and fibula lie as in a {} leg, but the case is of the {} side: medial rotation would rotate this leg laterally \
              (sine of the angle from the tibia to the fibula {:.2}, negative in a right leg)",
             shown, landmarks.side, fibula.sine,
         ),

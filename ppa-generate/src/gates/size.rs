@@ -26,7 +26,7 @@ const THICK_CM2: f64 = 550.0;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "what was found is {volume_cm3:.0} cm³ and {length_mm:.0} mm long, expected a limb of at least {LEAST_CM3:.0} cm³ and \
-     {LEAST_MM:.0} mm: does the scan show a limb? (--inside or --crop takes another part of it, --iso-hu another skin)"
+     {LEAST_MM:.0} mm: does the scan show a limb? (--inside or --crop selects another part of it, --iso-hu another skin)"
 )]
 pub struct NotALimb {
     /// Its volume, cm³.
@@ -59,7 +59,7 @@ pub(super) fn findings(size: &LimbSize, landmarks: &Landmarks) -> Vec<Finding> {
             Severity::Severe,
             size.length_mm,
             format!(
-                "the scan shows {:.0} mm of the limb, expected at least {SHORT_MM:.0}: over less its axis is \
+                "the scan shows {:.0} mm of the limb, expected at least {SHORT_MM:.0}: over a shorter length its axis is \
                  wrong by more than 2 degrees if its centres are wrong by 1 mm",
                 size.length_mm
             ),

@@ -133,7 +133,7 @@ fn along_image(volume: &Volume, report: &LimbReport, support: &Support) -> Optio
         angle_rad.to_degrees(),
         format!(
             "the supporting plane is the face {face} where the field of view cuts the limb (its normal is the image's axis within \
-             {:.4} degrees), not a plane under skin (--plane-point gives another one)",
+             {:.4} degrees), not a plane under the skin (--plane-point gives another one)",
             angle_rad.to_degrees()
         ),
     ))

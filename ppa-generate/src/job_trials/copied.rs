@@ -29,7 +29,7 @@ fn images_without_records_are_replaced_on_request_only() {
     fs::remove_file(root.join(".ppa/patient_7_r_001.json")).unwrap();
     let before = contents(root);
     let said = Trial::new().run(root).unwrap_err().to_string();
-    let words = "6 images, the first patient_7/depth/r/orig/depth_cam_left_0.5.png, are in none of its records";
+    let words = "6 images, the first patient_7/depth/r/orig/depth_cam_left_0.5.png, are not in any of its records";
     assert!(said.contains(words), "{said}");
     assert!(contents(root) == before);
     let summary = Trial::new().replacing().run(root).unwrap();

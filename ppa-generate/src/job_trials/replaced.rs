@@ -34,8 +34,8 @@ fn other_settings_are_refused_with_the_keys_that_differ() {
     let said = refused(&other(), folder.path());
     for words in [
         "4 of its 4 poses were made from other inputs",
-        "settings.xray.kvp is 60 there and 70 here",
-        "settings.shapes is [\"orig\",\"big\"] there and [\"orig\"] here",
+        "settings.xray.kvp is 60 in the dataset and 70 in this run",
+        "settings.shapes is [\"orig\",\"big\"] in the dataset and [\"orig\"] in this run",
         "--replace",
         "--out",
     ] {

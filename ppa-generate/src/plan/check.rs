@@ -34,7 +34,7 @@ impl Plan {
         shapes.sort_unstable();
         shapes.dedup();
         if shapes.len() != self.shapes.variants.len() {
-            return Err("shapes.variants names a shape twice".to_owned());
+            return Err("shapes.variants lists a shape twice".to_owned());
         }
         for (name, value) in [
             ("shapes.offset_mm", self.shapes.offset_mm),
@@ -76,13 +76,13 @@ impl Plan {
             ));
         }
         if self.xray.engine.seed != 0 {
-            return Err("xray.engine.seed is given, but the plan's seed decides".to_owned());
+            return Err("xray.engine.seed is given, but the plan's seed is used".to_owned());
         }
         if let Some(load) = &self.xray.tube_load {
             load.check()
                 .map_err(|error| format!("xray.tube_load: {error}"))?;
             if self.xray.analog.is_some() {
-                return Err("xray.tube_load is given with xray.analog, whose histories are followed one by one".to_owned());
+                return Err("xray.tube_load cannot be combined with xray.analog, whose histories are followed one by one".to_owned());
             }
         }
         self.check_room_and_exposure()?;
@@ -94,7 +94,7 @@ impl Plan {
         }
         if let Some(analog) = &self.xray.analog {
             if analog.seed != 0 {
-                return Err("xray.analog.seed is given, but the plan's seed decides".to_owned());
+                return Err("xray.analog.seed is given, but the plan's seed is used".to_owned());
             }
             let most = AnalogSettings::MOST_HISTORIES;
             if !(1..=most).contains(&analog.histories) {
@@ -105,11 +105,13 @@ impl Plan {
             }
         }
         if self.xray.calibration_file.is_some() {
-            return Err("xray.calibration_file is only looked at when a plan is read".to_owned());
+            return Err(
+                "xray.calibration_file is used only when a plan is read from a file".to_owned(),
+            );
         }
         if self.room.ply.is_none() && self.room.room_from_device.is_some() {
             return Err(
-                "room.room_from_device is given without room.ply: the built-in room has its device"
+                "room.room_from_device is given without room.ply: the built-in room defines its own"
                     .to_owned(),
             );
         }
