@@ -55,7 +55,7 @@ pub enum MergeError {
     #[error("{} is one of the shards; merge them into another folder", .0.display())]
     IntoShard(PathBuf),
     /// Shards that do not belong together.
-    #[error("{} and {} are of different datasets: {key} differs", first.display(), second.display())]
+    #[error("{} and {} belong to different datasets: {key} differs", first.display(), second.display())]
     OtherDataset {
         /// A shard.
         first: PathBuf,

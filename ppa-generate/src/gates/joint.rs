@@ -32,8 +32,8 @@ pub(super) fn findings(
             FindingCode::ProximalIsInferior,
             Severity::Caution,
             landmarks.scan_direction[2],
-            "the joint lies superior to the calf or inferior to the thigh, so that proximal was taken to be inferior: is the scan's orientation right, \
-             and with it left and right?"
+            "the joint lies superior to the calf or inferior to the thigh, so proximal was assumed to be inferior: is \
+             the scan's orientation correct, and with it left and right?"
                 .to_owned(),
         ));
     }
