@@ -301,9 +301,13 @@ mod tests {
             (
                 None,
                 slurm(2, 4, 1, 10, 3),
-                ["SLURM_ARRAY_TASK_ID is 2", "open"],
+                ["SLURM_ARRAY_TASK_ID is 2", "does not determine"],
             ),
-            (None, slurm(1, 4, 1, 4, 0), ["steps of 0", "open"]),
+            (
+                None,
+                slurm(1, 4, 1, 4, 0),
+                ["steps of 0", "does not determine"],
+            ),
             (
                 None,
                 "SLURM_ARRAY_TASK_ID=3".into(),
