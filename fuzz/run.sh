@@ -27,12 +27,16 @@ trap 'rm -rf "$corpus"' EXIT
 export TMPDIR=$corpus/files
 mkdir -p "$TMPDIR" artifacts
 cargo run --quiet --locked --manifest-path ../Cargo.toml --example fuzz_seeds -- "$corpus"
-for target in "${targets[@]}"; do
-    mkdir -p "$corpus/$target"
+# Runs a target and prints what it did, or the end of its log.
+fuzz() {
+    mkdir -p "$corpus/$1"
     # One thread each: threads of a pool would be waited for with every file.
-    RAYON_NUM_THREADS=1 "$bin/$target" "$corpus/$target" -max_total_time="$seconds" -timeout=20 \
-        -rss_limit_mb=1024 -malloc_limit_mb=1024 -max_len=4096 -artifact_prefix="artifacts/$target-" -print_final_stats=1 \
-        >"$corpus/log" 2>&1 || { tail -n 60 "$corpus/log"; exit 1; }
-    awk -v target="$target" '/number_of_executed_units/ { runs = $2 } /peak_rss_mb/ { rss = $2 }
-        END { printf "%-12s %8d files, at most %d MiB\n", target, runs, rss }' "$corpus/log"
-done
+    RAYON_NUM_THREADS=1 "$bin/$1" "$corpus/$1" -max_total_time="$seconds" -timeout=20 \
+        -rss_limit_mb=1024 -malloc_limit_mb=1024 -max_len=4096 -artifact_prefix="artifacts/$1-" -print_final_stats=1 \
+        >"$corpus/$1.log" 2>&1 || { tail -n 60 "$corpus/$1.log"; return 1; }
+    awk -v target="$1" '/number_of_executed_units/ { runs = $2 } /peak_rss_mb/ { rss = $2 }
+        END { printf "%-12s %8d files, at most %d MiB\n", target, runs, rss }' "$corpus/$1.log"
+}
+export -f fuzz
+export bin corpus seconds
+printf '%s\n' "${targets[@]}" | xargs -P "$(nproc)" -I{} bash -c 'fuzz {}'
