@@ -118,7 +118,7 @@ enum Command {
     Calibrate(commands::calibrate::CalibrateArgs),
     /// Predict pose quality from pairs of depth images as they arrive
     Predict(commands::predict::PredictArgs),
-    /// The paper's experiments: trainings and tables from one plan
+    /// Run the paper's experiments: training runs and tables from one plan
     #[command(subcommand)]
     Experiment(commands::experiment::ExperimentCommand),
     /// Metrics of predictions against labels

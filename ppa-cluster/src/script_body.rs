@@ -117,7 +117,7 @@ pub(crate) fn of_trainings(work: &TrainingWork, cpus: u32) -> (ScriptBody, Scrip
     let names = work.experiments.iter().map(|one| one.experiment.as_str());
     let names = names.collect::<Vec<_>>().join(" ");
     let last = ScriptBody {
-        title: format!("Writes the tables of {all} trainings."),
+        title: format!("Writes the tables of {all} training runs."),
         number: OF_LAST,
         run: format!(
             "find_missing() {{\n    \
@@ -130,7 +130,7 @@ pub(crate) fn of_trainings(work: &TrainingWork, cpus: u32) -> (ScriptBody, Scrip
              {FIND_MISSING}\
              # This job trains nothing itself.\n\
              if [ ${{#missing[@]}} -gt 0 ]; then\n    \
-             echo \"no tables: ${{#missing[@]}} of {count} trainings are not finished, such as ${{missing[0]}}\"\n    \
+             echo \"no tables: ${{#missing[@]}} of {count} training runs are not finished, such as ${{missing[0]}}\"\n    \
              exit 1\n\
              fi\n\
              for experiment in {names}; do\n    \

@@ -229,7 +229,7 @@ impl Submission {
                 Err(unusable(format!("it has {shards} shards of {poses} poses")))
             }
             Work::Trainings(work) if work.trainings().next().is_none() => {
-                Err(unusable("it has no trainings".to_owned()))
+                Err(unusable("it has no training runs".to_owned()))
             }
             Work::Histories(HistoryWork { divided, parts, .. })
                 if !(1..=divided.histories).contains(parts) =>

@@ -83,7 +83,7 @@ fn depths(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Raster<u16>> {
 
 #[pymethods]
 impl PyNetwork {
-    /// Load the networks of finished trainings.
+    /// Load the networks of finished training runs.
     ///
     /// Parameters
     /// ----------

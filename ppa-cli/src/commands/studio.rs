@@ -22,13 +22,13 @@ use crate::stderr::warning;
 
 #[derive(Debug, Args)]
 pub struct StudioArgs {
-    /// Scan, case, plan, dataset, training or folder of trainings to open [default: the built-in phantom, in the folder ppa-studio; nothing with --watch]
+    /// Scan, case, plan, dataset, training run or folder of training runs to open [default: the built-in phantom, in the folder ppa-studio; nothing with --watch]
     path: Option<PathBuf>,
     /// Side of the limb; needed for a scan without a case, and with --watch by networks that were trained with `mirror = true`
     #[arg(long, value_enum)]
     side: Option<SideName>,
-    /// After PATH: folders of finished trainings whose networks judge the poses in step 5, for the left and the right camera, or one for
-    /// both
+    /// After PATH: folders of finished training runs whose networks judge the poses in step 5, for the left and the right camera, or one
+    /// for both
     #[arg(long, value_name = "DIR", num_args = 1..=2)]
     run: Vec<PathBuf>,
     /// File that `ppa calibrate` wrote for these networks

@@ -31,7 +31,7 @@ const SHORT_S: f64 = 20.0 * 60.0;
 
 #[derive(Debug, Subcommand)]
 pub enum SubmitCommand {
-    /// Submit to Slurm: the shards of a plan, the trainings of experiments, or parts of the histories of a command
+    /// Submit to Slurm: the shards of a plan, the training runs of experiments, or parts of the histories of a command
     Slurm(SlurmArgs),
 }
 
@@ -49,8 +49,8 @@ progress and is requeued.
 
   ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1 --time 8:00:00
 
-For experiments, each training is a task. DIR/runs holds the trainings and the tables, DIR/experiments.html the report. Before \
-its time limit a task writes a checkpoint and is requeued.
+For experiments, each training run is a task. DIR/runs holds the training runs and the tables, DIR/experiments.html the \
+report. Before its time limit a task writes a checkpoint and is requeued.
 
   ppa submit slurm --out jobs --cpus 4 -- xray simulate leg.case.toml --engine analog --histories 2e10 --out leg.png
   ppa submit slurm --out jobs --cpus 4 -- xray mcgpu scan.in --out scan

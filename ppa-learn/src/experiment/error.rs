@@ -50,7 +50,7 @@ pub enum ExperimentError {
         source: Box<TrainError>,
     },
     /// Data that trainings need and that cannot be used.
-    #[error("{unusable} of {trainings} trainings of each seed cannot start: {problems}")]
+    #[error("{unusable} of {trainings} training runs of each seed cannot start: {problems}")]
     Unusable {
         /// Trainings of one seed that cannot begin.
         unusable: usize,

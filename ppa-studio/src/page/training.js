@@ -89,7 +89,7 @@ export class TrainingPanel {
     const text = byId("training-filter").value;
     const found = this.trainings.filter(({ name }) => name.includes(text));
     const finished = this.trainings.filter((one) => one.finished).length;
-    const count = `${found.length} of ${this.trainings.length} trainings, ${finished} finished, ${this.trainings.filter(runs).length} running`;
+    const count = `${found.length} of ${this.trainings.length} training runs, ${finished} finished, ${this.trainings.filter(runs).length} running`;
     if (byId("training-count").textContent !== count) byId("training-count").textContent = count;
     this.commands();
     // What has not changed stays, and with it the focus.
@@ -98,7 +98,7 @@ export class TrainingPanel {
     this.shown = shown;
     const focused = document.activeElement?.id;
     const rows = found.slice(0, LISTED).map((training) => this.row(training));
-    const none = element("p", this.trainings.length ? "No name contains this text." : "There are no trainings here. “ppa train” makes one; “ppa studio FOLDER” opens a folder of trainings.", { class: "hint" });
+    const none = element("p", this.trainings.length ? "No name contains this text." : "There are no training runs here. “ppa train” starts one; “ppa studio FOLDER” opens a folder of runs.", { class: "hint" });
     byId("training-table").replaceChildren(rows.length ? table(["Training", "Steps", "Loss", "MAE", "r_s", "State", "Errors"], rows) : none);
     if (found.length > LISTED) byId("training-table").append(element("p", `and ${found.length - LISTED} more: type part of their names on the right`, { class: "hint" }));
     if (focused?.startsWith("training-of-")) byId(focused)?.focus();

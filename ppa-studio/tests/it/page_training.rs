@@ -22,7 +22,7 @@ fn trainings_are_compared_and_their_errors_shown() {
         page.wait("document.body.dataset.step === 'training'").await;
         let count = "document.getElementById('training-count').textContent";
         page.wait(&format!(
-            "{count} === '3 of 3 trainings, 2 finished, 1 running'"
+            "{count} === '3 of 3 training runs, 2 finished, 1 running'"
         ))
         .await;
         let lines =

@@ -30,7 +30,7 @@ const WORST_SIDE: usize = 96;
 pub struct ReportArgs {
     /// Plan of the experiments
     plan: PathBuf,
-    /// Folder of the trainings, as given to `ppa experiment 1`
+    /// Folder of the training runs, as given to `ppa experiment 1`
     #[arg(long, value_name = "DIR")]
     runs: PathBuf,
     /// Page to write

@@ -24,8 +24,8 @@ use crate::stderr;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
-Each training is a folder of its own below --out. A run may be stopped at any moment and started again: what is finished \
-stays, unfinished trainings resume. On several machines that share the folder each makes a shard; the last command, without \
+Each training run has a folder of its own below --out. The command may be stopped at any time and started again: finished \
+runs stay, others resume. On several machines that share the folder each makes a shard; the last command, without \
 --shard, finds everything made and writes the tables.
 
   ppa experiment 2a plan.toml --out runs --shard 3/10
@@ -57,7 +57,7 @@ A plan:
 pub struct RunArgs {
     /// Plan of the experiments
     plan: PathBuf,
-    /// Folder of the trainings and tables
+    /// Folder of the training runs and tables
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Run only shard k of n, and write no tables
@@ -289,7 +289,7 @@ fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result
     let there = tables.iter().find(|path| path.exists());
     match there {
         Some(path) if !replace.is_given() => bail!(
-            "{} exists and would be replaced after the trainings: give --replace, or move it away",
+            "{} exists and would be replaced after the training runs: give --replace, or move it away",
             path.display()
         ),
         _ => Ok(()),
@@ -358,7 +358,7 @@ fn describe(outcome: &Outcome) -> String {
     let mut lines = vec![match (&outcome.table, outcome.finished) {
         (Some(table), _) => table.trim_end().to_owned(),
         (None, true) => format!(
-            "the requested trainings are finished; {} missing from the whole experiment",
+            "the requested training runs are finished; {} missing from the whole experiment",
             match outcome.missing {
                 1 => "1 test set is".to_owned(),
                 n => format!("{n} test sets are"),

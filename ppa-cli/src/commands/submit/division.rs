@@ -226,7 +226,7 @@ fn poses(
 fn check_time(settings: &TaskSettings) -> anyhow::Result<()> {
     ensure!(
         settings.time.seconds() >= SHORTEST_S,
-        "the time limit {} is too short for a training, expected at least {}",
+        "the time limit {} is too short for a training run, expected at least {}",
         settings.time,
         TimeLimit::from_seconds(SHORTEST_S)
     );
