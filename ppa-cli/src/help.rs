@@ -113,6 +113,21 @@ mod tests {
     }
 
     #[test]
+    fn examples_fit_into_eighty_columns() {
+        fn check(command: &clap::Command) {
+            let text = command.get_after_long_help().map(ToString::to_string);
+            // Other lines are paragraphs, which clap wraps. A wrapped example can no longer be copied.
+            let text = text.unwrap_or_default();
+            let examples = text.lines().filter(|line| line.starts_with("  "));
+            for line in examples {
+                assert!(line.chars().count() <= 80, "{}: {line}", command.get_name());
+            }
+            command.get_subcommands().for_each(check);
+        }
+        check(&command());
+    }
+
+    #[test]
     fn the_definition_of_the_command_line_is_consistent() {
         command().debug_assert();
     }

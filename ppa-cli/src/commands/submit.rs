@@ -39,7 +39,7 @@ pub enum SubmitCommand {
 #[command(after_long_help = "\
   ppa submit slurm plan.toml --out jobs --cpus 4 --time 2:00:00
   ppa status jobs
-  ppa submit slurm plan.toml --out jobs      # again: only shards that are missing
+  ppa submit slurm plan.toml --out jobs   # again: only missing shards
 
 For a plan, one pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled \
 into shards of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that takes less is one shard. \
@@ -47,12 +47,13 @@ DIR/shards/K holds shard K, DIR/dataset the merged dataset, verified unless its 
 DIR/dataset.tar, for file systems with a limit on the number of files. Before its time limit a task finishes the poses in \
 progress and is requeued.
 
-  ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1 --time 8:00:00
+  ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1
 
 For experiments, each training run is a task. DIR/runs holds the training runs and the tables, DIR/experiments.html the \
 report. Before its time limit a task writes a checkpoint and is requeued.
 
-  ppa submit slurm --out jobs --cpus 4 -- xray simulate leg.case.toml --engine analog --histories 2e10 --out leg.png
+  ppa submit slurm --out jobs --cpus 4 -- \\
+      xray simulate leg.case.toml --engine analog --histories 2e10 --out leg.png
   ppa submit slurm --out jobs --cpus 4 -- xray mcgpu scan.in --out scan
 
 For a command that follows analog histories, each task follows a part of them, and the last job writes the outputs of the \

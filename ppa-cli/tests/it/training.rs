@@ -120,7 +120,10 @@ fn an_experiment_names_all_missing_data_before_it_trains() {
     fs::write(folder.join("plan.toml"), plan).unwrap();
     let said = fail(folder, "experiment 1 plan.toml --out runs");
     // Without variants of the skin one column of four can be made, of each fold and view.
-    assert!(said.contains("12 of 16 training runs of each seed"), "{said}");
+    assert!(
+        said.contains("12 of 16 training runs of each seed"),
+        "{said}"
+    );
     for shape in ["big", "small", "bumps_a", "bumps_b"] {
         let missing = format!("there is no image of body shape {shape}");
         assert!(said.contains(&missing), "{said}");
@@ -143,8 +146,7 @@ fn an_experiment_makes_the_chosen_columns_only() {
     let expected = "--columns: found skin, expected some of original, size, bumps, all";
     assert!(said.contains(expected), "{said}");
     let said = succeed(folder, &columns("original"));
-    let expected =
-        "the requested training runs are finished; 6 test sets are missing from the whole experiment";
+    let expected = "the requested training runs are finished; 6 test sets are missing from the whole experiment";
     assert!(said.contains(expected), "{said}");
     assert_eq!(names(&folder.join("runs/experiment_1")), ["original"]);
     assert!(!folder.join("runs/experiment_1.md").exists());

@@ -22,9 +22,10 @@ const AIR_HU: f32 = -1000.0;
 Voxels stay as they are unless a change is asked for. Changes are made in the order of the options above; values \
 between voxels are interpolated linearly, after a low-pass along axes that become coarser.
 
-  ppa ct convert scans/leg leg.nrrd                           the same voxels in another format
-  ppa ct convert scans/head head.nii.gz --upright             a tilted gantry set upright
-  ppa ct convert leg.nrrd foot.mha --crop-mm=-60,60,-90,150,-400,-250 --spacing-mm 1")]
+  ppa ct convert scans/leg leg.nrrd                  # the same voxels
+  ppa ct convert scans/head head.nii.gz --upright    # a tilted gantry
+  ppa ct convert leg.nrrd foot.mha --spacing-mm 1 \\
+      --crop-mm=-60,60,-90,150,-400,-250")]
 pub struct ConvertArgs {
     #[command(flatten)]
     input: ScanArgs,

@@ -29,10 +29,10 @@ man; the seventeen of the table spread their mortise angles from 10 to 29 degree
 mirror image of the right one with every dimension off by about 1 %. In radiographs voxels of 0.8 mm show as fine \
 stripes where bone slants across the beam, as in the metatarsals; with voxels of 0.5 mm these are less than half as strong.
 
-  ppa ct phantom --out p01.nii.gz --table                     the phantom of the demo, on a table top
-  ppa ct phantom --name P07 --side l --out p07_l.nii.gz       the left leg of another one
+  ppa ct phantom --out p01.nii.gz --table                 # that of the demo
+  ppa ct phantom --name P07 --side l --out p07_l.nii.gz   # a left leg
   ppa ct phantom --seed 42 --noise-hu 15 --blur-mm 1 --out 42.nii.gz
-  ppa prepare p01.nii.gz --side r --out p01.case.toml         what comes next
+  ppa prepare p01.nii.gz --side r --out p01.case.toml     # the next step
 
 --json prints what a measurement should find under \"truth\": frame ct (LPS), mm and radians.")]
 pub struct PhantomArgs {

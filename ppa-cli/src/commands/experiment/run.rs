@@ -36,10 +36,10 @@ runs stay, others resume. On several machines that share the folder each makes a
 A plan:
 
   seeds = 10                          # repetitions
-  imagenet_weights = \"b0.safetensors\" # or .pth; its columns are left out without it
-  [training]
-  preset = \"paper\"                    # or \"standard\", \"quick\", and what differs, as in `ppa train`
-  [finetuning]                        # what differs from [training] in 2a, 2b and 2c, from scratch or not
+  imagenet_weights = \"b0.safetensors\" # or .pth; without it, no such columns
+  [training]                          # keys of `ppa train`
+  preset = \"paper\"                    # or \"standard\", \"quick\"
+  [finetuning]                        # where 2a to 2c differ from [training]
   steps = 50000
   [synthetic]
   dataset = \"synthetic\"
@@ -52,8 +52,8 @@ A plan:
   dataset = \"clinical\"
   folds = 3
   [learning_curves]
-  persons = [5, 10, 17]               # of `ppa experiment persons`: numbers of persons to train with
-  every_pose = [4, 2, 1]              # of `ppa experiment poses`: train with every n-th angle of each limb")]
+  persons = [5, 10, 17]               # numbers, for `experiment persons`
+  every_pose = [4, 2, 1]              # every n-th angle, for `... poses`")]
 pub struct RunArgs {
     /// Plan of the experiments
     plan: PathBuf,

@@ -15,7 +15,8 @@ Writes manifest.csv, croissant.json (Croissant 1.1), ro-crate-metadata.json (RO-
 (Datasheets for Datasets; questions that no program can answer stay open) into the dataset. A datasheet.md that is there and differs stays; \
 the new one is then datasheet.new.md.
 
-  ppa export metadata dataset --name ankles --license https://creativecommons.org/licenses/by/4.0/ --date 2026-11-21")]
+  ppa export metadata dataset --name ankles --date 2026-11-21 \\
+      --license https://creativecommons.org/licenses/by/4.0/")]
 pub struct MetadataArgs {
     /// Dataset that `ppa generate` finished
     dataset: PathBuf,

@@ -35,13 +35,17 @@ NAME, labels.NAME.json, openness.NAME.csv and openness.NAME.json are written ins
 
 Thresholds are a TOML file, one number for each of the grades 1, 1.5, 2 and 2.5. These are the defaults of the graded scale:
 
-  hidden_mm = [0.75, 2.25, 3.75, 5.25] # how far a malleolus may cover the talus, median over the height of its gutter
-  lost_contrast = [0.1, 0.3, 0.5, 0.7] # how much the superior gutter may lose of its best contrast
+  # Greatest cover of the talus by a malleolus: median over the gutter's height
+  hidden_mm = [0.75, 2.25, 3.75, 5.25]
+  # Greatest loss of the superior gutter's contrast, compared with its best
+  lost_contrast = [0.1, 0.3, 0.5, 0.7]
 
 and of the strict one:
 
-  relative_to = \"own_best\"             # or \"each_gutter\": no credit for facets that are never open together
-  at_least = [0.75, 0.5, 0.25, 0.03]   # least openness of the worst gutter")]
+  # Or \"each_gutter\": no credit for facets that are never open together
+  relative_to = \"own_best\"
+  # Least openness of the worst gutter
+  at_least = [0.75, 0.5, 0.25, 0.03]")]
 pub struct AutoArgs {
     /// Folder of a dataset
     dataset: PathBuf,

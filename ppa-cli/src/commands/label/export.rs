@@ -19,8 +19,8 @@ Give readers the folder: it holds a page that needs no network, or several of 20
 CSV. Names and order of the pictures are random; a tenth of them comes twice; all have the same window. Keep the key: \
 it identifies the pictures.
 
-  ppa label export dataset --out for_readers --every-deg 5      writes for_readers.key.csv as well
-  ppa label import dataset --key for_readers.key.csv grades_anna.csv grades_ben.csv")]
+  ppa label export dataset --out for_readers --every-deg 5   # and the key
+  ppa label import dataset --key for_readers.key.csv grades_anna.csv")]
 pub struct ExportArgs {
     /// Folder of a dataset
     dataset: PathBuf,

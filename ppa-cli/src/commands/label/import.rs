@@ -16,8 +16,8 @@ the readers' first grades. All grades are kept in grades.csv of the dataset: giv
 further readers, and to `ppa label agree`. In labels.json readers' labels take the place of computed ones, all of which stay in \
 labels.computed.json; radiographs that no reader graded keep their computed label.
 
-  ppa label import dataset --key for_readers.key.csv grades_anna.csv grades_ben.csv
-  ppa label import dataset --key second.key.csv dataset/grades.csv grades_carl.csv
+  ppa label import dataset --key for_readers.key.csv grades_*.csv
+  ppa label import dataset --key second.key.csv dataset/grades.csv carl.csv
   ppa label agree dataset/grades.csv")]
 pub struct ImportArgs {
     /// Folder of a dataset
