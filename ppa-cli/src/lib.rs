@@ -40,7 +40,7 @@ struct Cli {
     /// Print one JSON object instead of text, and JSON lines on stderr
     ///
     /// Each line on stderr is then one object: {"warning": "…"}, {"note": "…"}, progress with the keys done and units, and, if the command
-    /// fails, {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 for an invalid command line, else 1.
+    /// fails, {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 for an invalid command line, otherwise 1.
     #[arg(long, global = true)]
     json: bool,
     /// When to colour messages, help and progress

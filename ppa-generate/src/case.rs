@@ -31,7 +31,7 @@ pub struct Case {
     pub surface: LimbSettings,
     /// Landmark decisions of a person; what is left out is determined again.
     pub choices: LandmarkOverrides,
-    /// Which bone each voxel belongs to, for computed labels.
+    /// Bone label of each voxel, for computed labels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bones: Option<BoneFile>,
     /// What was derived from the other keys when the case was written; `None` for a case that was read, since a person may have edited it.

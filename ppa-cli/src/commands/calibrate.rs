@@ -16,7 +16,7 @@ use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "None of the persons may have been trained with, and the dataset must have images of both cameras. Intervals come from the absolute errors of their poses (split conformal prediction): \
+    after_help = "The networks must not have been trained with any of these persons, and the dataset must have images of both cameras. Intervals come from the absolute errors of their poses (split conformal prediction): \
 for a new person, they contain the label of a pose with a probability of about the coverage. `ppa predict` refuses a frame whose network features or mean depths of 8 x 8 blocks lie farther from \
 those of training images than 99 % of the calibration images' do."
 )]

@@ -16,8 +16,8 @@ use crate::stderr;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
-A run may be killed at any moment and started again: only what is missing is made. On several machines each makes a \
-shard, into a folder of its own; `ppa merge` joins them to the same bytes as one run leaves.
+A run may be killed at any time and started again: only missing poses are made. On several machines, each makes one shard \
+in its own folder; `ppa merge` joins them to the same bytes as a single run.
 
   ppa generate plan.toml --out dataset
   ppa generate plan.toml --shard 2/7 --out shard_2 --disk-limit 20GB
@@ -50,7 +50,7 @@ pub struct GenerateArgs {
     /// Replace what differs from the plan; old images stay until the new ones are complete
     #[arg(long)]
     replace: bool,
-    /// Stop before the images take more than this, such as 500MB or 20GB
+    /// Stop before the images exceed this size, such as 500MB or 20GB
     #[arg(long, value_name = "SIZE", value_parser = crate::output::parse_bytes)]
     disk_limit: Option<u64>,
     #[command(flatten)]

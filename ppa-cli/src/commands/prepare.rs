@@ -28,7 +28,7 @@ enum LimbName {
     LowerLeg,
     /// Knee with parts of thigh or lower leg
     Knee,
-    /// Anything else: turned about its axis at the middle of its length
+    /// Any other limb, rotated about its axis at the middle of its length
     Other,
 }
 
@@ -105,7 +105,7 @@ pub struct PrepareArgs {
     /// Draw no picture
     #[arg(long, conflicts_with = "picture")]
     no_picture: bool,
-    /// Which bone each voxel belongs to, for `ppa label auto`: NIfTI, NRRD or MetaImage in the scan's frame
+    /// Bone label of each voxel, for `ppa label auto`: NIfTI, NRRD or MetaImage in the scan's frame
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
     /// Segment tibia, fibula, talus and neighbouring bones for `ppa label auto`, and write the label volume: NIfTI, NRRD or MetaImage.

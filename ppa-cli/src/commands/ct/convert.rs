@@ -29,7 +29,7 @@ between voxels are interpolated linearly, after a low-pass along axes that becom
 pub struct ConvertArgs {
     #[command(flatten)]
     input: ScanArgs,
-    /// What to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
+    /// File to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
     output: PathBuf,
     /// Keep only this box of the scan's voxels: first and one past the last index along i, j and k
     #[arg(long, value_name = "I,I,J,J,K,K", value_parser = voxel_box)]

@@ -36,7 +36,7 @@ stripes where bone slants across the beam, as in the metatarsals; with voxels of
 
 --json prints what a measurement should find under \"truth\": frame ct (LPS), mm and radians.")]
 pub struct PhantomArgs {
-    /// What to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
+    /// File to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
     #[arg(long)]
     out: PathBuf,
     /// Built-in lower leg: P01 to P17 [default: P01]
@@ -48,7 +48,7 @@ pub struct PhantomArgs {
     /// Side of the body
     #[arg(long, value_enum, default_value = "r")]
     side: SideName,
-    /// Which limb
+    /// Kind of limb
     #[arg(long, value_enum, default_value = "lower-leg")]
     limb: LimbName,
     /// Put a titanium plate with five screws on the fibula

@@ -20,7 +20,7 @@ half that number. The earliest image of a pose becomes orig; what is left out is
 pub struct ConvertArgs {
     /// Dataset in either layout
     dataset: PathBuf,
-    /// Folder of the new dataset, which must not be there yet
+    /// Folder of the new dataset, which must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Which flexion to write, or to read

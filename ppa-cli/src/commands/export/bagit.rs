@@ -16,7 +16,7 @@ Every image must be as in manifest.jsonl. Hidden files and grades.csv, which nam
 pub struct BagitArgs {
     /// Dataset
     dataset: PathBuf,
-    /// Folder of the bag, which must not be there yet
+    /// Folder of the bag, which must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

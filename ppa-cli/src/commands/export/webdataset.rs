@@ -18,7 +18,7 @@ archives of its own, train-000000.tar; a person is in one part only.")]
 pub struct WebdatasetArgs {
     /// Dataset in either published layout
     dataset: PathBuf,
-    /// Folder of the archives, which must not be there yet
+    /// Folder of the archives, which must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Image pairs per archive

@@ -22,7 +22,7 @@ The gutters between talus, tibia and fibula are followed along the rays of every
 cases of the plan name the bones (`ppa prepare --bones` or `--segment-bones`). The graded scale grades by how many mm a malleolus covers \
 the talus and by the contrast of the superior gutter; it is as wide as readers' grades. The strict scale grades by the share of each \
 gutter through which rays pass freely. Writes labels.json, with label_source surrogate-jso/2 (strict: surrogate-jso/1; with bones \
-from --segment-bones, -segmented), labels.computed.json with the same labels, and beside them openness.csv: openness, cover and grade of each gutter, \
+from --segment-bones, -segmented), labels.computed.json with the same labels, and next to them openness.csv: openness, cover and grade of each gutter, \
 overlaps and clear spaces in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of \
 the bones and of the code. Labels of readers stay in labels.json; computed ones are added there where no reader graded. With --name \
 NAME, labels.NAME.json, openness.NAME.csv and openness.NAME.json are written instead and labels.json stays as it is; \
