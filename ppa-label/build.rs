@@ -1,4 +1,4 @@
-//! Hashes the sources that computed labels follow from, so that a dataset records which program computed its labels.
+//! Hashes the sources that determine computed labels, so that a dataset records which program computed its labels.
 
 use std::path::PathBuf;
 use std::{env, io};

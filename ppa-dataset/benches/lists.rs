@@ -1,4 +1,4 @@
-//! The lists of a dataset of the paper's size: the manifest as text, labels of one limb, a split by person.
+//! Benchmarks for the lists of a dataset of the paper's size: the manifest as text, the labels of one limb, a split by person.
 
 use std::hint::black_box;
 

@@ -1,4 +1,4 @@
-//! Writes depth images and labels of ten persons in the published layout, lists them, and draws parts that share no person.
+//! Writes depth images and labels of ten persons in the published layout, lists them, and draws parts with no person in common.
 //!
 //! `cargo run -p ppa-dataset --example split_by_person`
 

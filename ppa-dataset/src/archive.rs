@@ -1,4 +1,4 @@
-//! Tar archives of files: written whole, or extended file by file.
+//! Tar archives of files: written in one go, or extended file by file.
 //!
 //! An archive that a program extends may end in the middle of a member when the program is killed, and a damaged disk may
 //! destroy a header. [`Archive::scan`] therefore lists all members whose headers are valid and whose data are complete.
@@ -12,7 +12,7 @@ use tar::{EntryType, Header};
 
 use crate::files::FileError;
 
-/// Bytes of a header; data are padded to a multiple of it.
+/// Bytes of a header; data are padded to a multiple of this.
 const BLOCK: u64 = 512;
 
 /// Blocks of zeros at the end of an archive.
@@ -23,39 +23,39 @@ const END_BLOCKS: u64 = 2;
 pub struct Member {
     /// Path as in the archive, without a leading `./`.
     pub name: String,
-    /// Where its data begin, bytes from the start of the archive.
+    /// Start of its data, bytes from the start of the archive.
     pub start: u64,
     /// Bytes of its data.
     pub size: u64,
 }
 
 impl Member {
-    /// Where the next member begins, bytes from the start of the archive.
+    /// Start of the next member, bytes from the start of the archive.
     pub fn end(&self) -> u64 {
         self.start + self.size.next_multiple_of(BLOCK)
     }
 }
 
-/// What an archive holds.
+/// Contents of an archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Archive {
     path: PathBuf,
-    /// Its files, in their order; a name may occur several times.
+    /// Its files in archive order; a name may occur several times.
     pub members: Vec<Member>,
     /// Bytes of the file.
     pub length: u64,
-    /// Where the first block is that belongs to no member and is not zero, bytes from the start of the archive.
+    /// First block that belongs to no member and is not zero, bytes from the start of the archive.
     pub damage: Option<u64>,
-    /// Whether it ends within a member.
+    /// Whether the archive ends within a member.
     is_torn: bool,
 }
 
 impl Archive {
-    /// Lists the members of the archive at `path`. Folders, links and extended headers are passed over.
+    /// Lists the members of the archive at `path`, skipping folders, links and extended headers.
     ///
     /// # Errors
-    /// [`FileError`] when the file cannot be read. Any bytes are accepted: those that are no members are reported by
-    /// [`Archive::damage`].
+    /// [`FileError`] when the file cannot be read. Any bytes are accepted: [`Archive::damage`] reports those that belong to no
+    /// member.
     pub fn scan(path: &Path) -> Result<Self, FileError> {
         let scanned = ppa_core::regular_file::open(path).and_then(|mut file| scan(&mut file));
         let scanned = scanned.map_err(FileError::at("read", path))?;
@@ -65,12 +65,12 @@ impl Archive {
         })
     }
 
-    /// Whether it ends as [`ArchiveWriter::finish`] ends an archive whose last member ends at `end`.
+    /// Whether the archive ends as [`ArchiveWriter::finish`] would end it after a last member that ends at `end`.
     pub fn ends_after(&self, end: u64) -> bool {
         self.length == end + END_BLOCKS * BLOCK
     }
 
-    /// Whether blocks of zeros end it, as in each archive that a program has completed.
+    /// Whether the archive ends with blocks of zeros, as every completed archive does.
     pub fn is_closed(&self) -> bool {
         let end = self.members.last().map_or(0, Member::end);
         let is_followed = self.is_torn || self.damage.is_some_and(|at| at >= end);
@@ -107,7 +107,7 @@ impl Archive {
     }
 }
 
-/// What an archive holds; its path is left empty.
+/// Scans an archive; leaves its path empty.
 fn scan(file: &mut File) -> io::Result<Archive> {
     let length = file.metadata()?.len();
     let mut members = Vec::new();
@@ -152,7 +152,7 @@ fn scan(file: &mut File) -> io::Result<Archive> {
     })
 }
 
-/// Name of the file, if it is one, and size of the data that follow a block; `None` unless the block is a header.
+/// Name of the file, if it is one, and size of the data that follow a header block; `None` if the block is not a header.
 fn header(block: &[u8; BLOCK as usize]) -> Option<(Option<String>, u64)> {
     let header = Header::from_byte_slice(block);
     if !block[257..].starts_with(b"ustar") || header.cksum().ok()? != checksum(block) {
@@ -177,12 +177,12 @@ fn checksum(block: &[u8; BLOCK as usize]) -> u32 {
     sum(&block[..148]) + 8 * u32::from(b' ') + sum(&block[156..])
 }
 
-/// Whether a dataset of this path is an archive: its name ends in `.tar`, and it is no folder.
+/// Whether the dataset at this path is an archive: the name ends in `.tar`, and it is not a folder.
 pub fn is_archive(root: &Path) -> bool {
     root.extension().is_some_and(|ending| ending == "tar") && !root.is_dir()
 }
 
-/// Refuses an archive where a dataset is to be read from a folder.
+/// Returns an error for an archive where a dataset must be read from a folder.
 pub(crate) fn require_folder(root: &Path) -> Result<(), FileError> {
     let extract = "it is an archive; extract it to a folder first, for example with tar -xf";
     match is_archive(root) && root.exists() {
@@ -196,7 +196,7 @@ pub(crate) fn require_folder(root: &Path) -> Result<(), FileError> {
 pub struct ArchiveWriter<W>(W);
 
 impl<W: Write> ArchiveWriter<W> {
-    /// Writes from the current position of `to` on.
+    /// Writes from the current position of `to`.
     pub fn new(to: W) -> Self {
         Self(to)
     }
@@ -229,10 +229,10 @@ impl<W: Write> ArchiveWriter<W> {
     }
 }
 
-/// Writes members over what follows the first `end` bytes of a file and brings them to the disk. Returns where they end.
+/// Replaces everything after the first `end` bytes of a file with members and syncs it to disk. Returns where they end.
 ///
 /// # Errors
-/// [`io::Error`] of the system; the file then ends where it did not change.
+/// [`io::Error`] of the system; the file is then cut off at `end`.
 pub fn extend(file: &mut File, end: u64, members: &[(String, Vec<u8>)]) -> io::Result<u64> {
     let mut writer = ArchiveWriter::new(Vec::new());
     for (name, bytes) in members {

@@ -1,8 +1,8 @@
-//! Names of the paper's body shapes: the limb as it is, and four variants of its skin.
+//! The paper's body shapes: the limb as it is, and four variants of its skin.
 
 use serde::{Deserialize, Serialize};
 
-/// A variant of the skin. The bones, and so the radiograph and its label, are the same in all.
+/// A variant of the skin. The bones, and therefore the radiograph and its label, are the same in all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BodyShape {

@@ -1,5 +1,5 @@
-//! `checksums.sha256` and `labels.sha256`: hashes of a dataset's lists, and of what was added to it since, as
-//! `sha256sum --check` reads them.
+//! `checksums.sha256` and `labels.sha256`: hashes of a dataset's lists and of files added to it later, in the format of
+//! `sha256sum --check`.
 //!
 //! The lists cover the images; a last line covers the file itself.
 
@@ -12,21 +12,21 @@ use sha2::{Digest, Sha256};
 
 use crate::files::{FileError, hex, sha256_of_file, write_whole};
 
-/// What the last line begins with: a comment to `sha256sum`.
+/// Beginning of the last line: a comment to `sha256sum`.
 const OWN: &str = "# sha256 of the lines above: ";
 
 /// Hash of each file by its path from the dataset's root.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Checksums(BTreeMap<String, String>);
 
-/// What stands in a dataset.
+/// State of a file of hashes in a dataset.
 #[derive(Debug, PartialEq, Eq)]
 pub enum FoundChecksums {
     /// No file.
     Absent,
-    /// A file whose last line fits.
+    /// A file that matches the hash in its last line.
     Whole(Checksums),
-    /// A file that is not as it was written.
+    /// A file that was changed after it was written.
     Damaged,
 }
 
@@ -42,7 +42,7 @@ impl Checksums {
         Self::look_at(root, Self::FILE)
     }
 
-    /// Reads one of the files of the dataset in `root`.
+    /// Reads one of the two files of hashes of the dataset in `root`.
     pub fn look_at(root: &Path, file: &str) -> Result<FoundChecksums, FileError> {
         let path = root.join(file);
         match fs::read(&path) {
@@ -62,14 +62,14 @@ impl Checksums {
         let pair = |line: &str| {
             let (hash, file) = line.split_once("  ")?;
             let mut parts = Path::new(file).components();
-            // A list of another dataset may come from anywhere; it names no file outside of its folder.
+            // The file may come from an untrusted dataset: reject paths that leave its folder.
             let below = parts.all(|part| matches!(part, Component::Normal(_)));
             below.then(|| (file.to_owned(), hash.to_owned()))
         };
         lines.lines().map(pair).collect::<Option<_>>().map(Self)
     }
 
-    /// Adds the hashes of files below `root` that were just written to `labels.sha256`; those of other files stay.
+    /// Adds the hashes of newly written files below `root` to `labels.sha256`; those of other files stay.
     pub fn record_labels(root: &Path, files: &[PathBuf]) -> Result<(), FileError> {
         let path = root.join(Self::OF_LABELS);
         let mut sums = match Self::look_at(root, Self::OF_LABELS)? {
@@ -91,13 +91,13 @@ impl Checksums {
         write_whole(&path, sums.to_text().as_bytes())
     }
 
-    /// The file's text.
+    /// The text of the file.
     pub fn to_text(&self) -> String {
         let line = |(file, hash)| format!("{hash}  {file}\n");
         with_own_line(&self.0.iter().map(line).collect::<String>())
     }
 
-    /// The files below `root` that are missing or have another hash.
+    /// Returns the files below `root` that are missing or have another hash.
     pub fn altered(&self, root: &Path) -> Vec<String> {
         let same = |(file, hash): &(&String, &String)| {
             sha256_of_file(&root.join(file)).is_ok_and(|found| found == **hash)
@@ -116,7 +116,7 @@ impl FoundChecksums {
         }
     }
 
-    /// The lists that are covered, in the order of their paths.
+    /// The listed files, sorted by path.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let hashes = match self {
             Self::Whole(Checksums(hashes)) => Some(hashes),
@@ -127,7 +127,7 @@ impl FoundChecksums {
 }
 
 impl Checksums {
-    /// Of files given by path and text.
+    /// Hashes files given by path and text.
     pub fn of<'a>(files: impl Iterator<Item = (&'a str, &'a str)>) -> Self {
         let hash = |text: &str| hex(&Sha256::digest(text.as_bytes()));
         Self(

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all, and their hashes.
+//! Files written completely or not at all, and their hashes.
 
 use std::fs;
 use std::io;
@@ -15,7 +15,7 @@ pub struct FileError {
     pub action: &'static str,
     /// The file at fault.
     pub path: PathBuf,
-    /// What the system said.
+    /// The error of the system.
     pub source: io::Error,
 }
 
@@ -30,10 +30,10 @@ impl FileError {
     }
 }
 
-/// Writes a file through a temporary neighbour, synced and then renamed.
+/// Writes a file through a temporary file in the same folder, which is synced and then renamed.
 ///
 /// # Errors
-/// [`FileError`] when the folder cannot be made or the file not written; nothing is left behind.
+/// [`FileError`] when the folder cannot be created or the file cannot be written; nothing is left behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -43,7 +43,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     whole_file::write(path, bytes).map_err(FileError::at("write", path))
 }
 
-/// Removes a file that may not be there.
+/// Removes a file if it exists.
 pub fn remove_if_there(path: &Path) -> Result<(), FileError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
@@ -67,7 +67,7 @@ pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
     Ok(hex(&Sha256::digest(bytes)))
 }
 
-/// Lower-case hexadecimal.
+/// Bytes as lower-case hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

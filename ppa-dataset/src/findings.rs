@@ -1,7 +1,7 @@
-//! Findings: doubts about a limb or a pose, carried with the data from the case to the training.
+//! Findings: doubts about a limb or a pose, passed on with the data from the case to training.
 //!
-//! `ppa prepare` writes them into the case, a dataset lists those of all its limbs in `findings.json`. A person who has
-//! looked at a severe one names its code in `acknowledged` of the case; until then every command repeats it.
+//! `ppa prepare` writes them into the case; a dataset lists those of all its limbs in `findings.json`. A person who has
+//! checked a severe one adds its code to `acknowledged` of the case; until then every command repeats it.
 
 use std::fmt;
 use std::fs;
@@ -14,13 +14,13 @@ use crate::archive::require_folder;
 use crate::files::{FileError, read_text};
 use crate::layout::LimbId;
 
-/// How much a finding matters.
+/// Importance of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// Good to know; nothing to do.
+    /// For information only.
     Note,
-    /// Look at the limb before using its images.
+    /// Check the limb before using its images.
     Caution,
     /// The images are probably wrong.
     Severe,
@@ -35,7 +35,7 @@ pub enum FindingCode {
     ScanWarning,
     /// The scan shows several limbs.
     SeveralLimbs,
-    /// Another limb, cut by the image, lies on the side that was asked for.
+    /// Another limb, cut off by the image, is on the requested side.
     OtherLimbOnSide,
     /// A person kept a further body as a part of the limb.
     BodyKept,
@@ -43,7 +43,7 @@ pub enum FindingCode {
     PartRemoved,
     /// The limb is too thin or too short to be a limb.
     LimbTooSmall,
-    /// The limb is too thick to be a limb: a trunk.
+    /// The limb is too thick to be a limb, for example a trunk.
     LimbTooLarge,
     /// A part of another limb is fused to the skin.
     FusedLimb,
@@ -51,7 +51,7 @@ pub enum FindingCode {
     CutLimb,
     /// The field of view cuts the limb within a region of interest.
     CutInRegion,
-    /// The supporting plane lies on a face where the field of view cuts the limb.
+    /// The supporting plane is on a face where the field of view cuts the limb.
     PlaneOnCut,
     /// The normal of the supporting plane is parallel to an axis of the image.
     PlaneAlongImage,
@@ -59,47 +59,47 @@ pub enum FindingCode {
     ContactsTooNear,
     /// A person gave the supporting plane.
     PlaneGiven,
-    /// The axis of rotation is inclined to the bone's shaft.
+    /// The axis of rotation is inclined to the shaft of the bone.
     AxisOffShaft,
-    /// The axis of a lower leg passes through centres of the skin's cross-sections, not the tibia's.
+    /// The axis of a lower leg passes through the centres of the skin's cross-sections, not of the tibia's.
     AxisWithoutBone,
     /// The regions that define the axis are closer together than in a sufficiently long scan.
     RegionsCloser,
-    /// The fibula lies where it would in a limb of the other side.
+    /// The fibula is where it would be in a limb of the other side.
     SideMismatch,
     /// The anterior direction points to the patient's back.
     AnteriorReversed,
     /// Neither an ankle nor a knee was found.
     NoJoint,
-    /// The joint centre lies outside the limb.
+    /// The joint centre is outside the limb.
     JointOutside,
-    /// The joint does not lie at the ankle that the scan shows.
+    /// The joint is not at the ankle visible in the scan.
     JointOffAnkle,
-    /// The joint lies outside the radiograph.
+    /// The joint is outside the radiograph.
     JointOffDetector,
-    /// The joint did not lie on the axis that a person gave.
+    /// The joint was not on the axis that a person gave.
     JointOffAxis,
-    /// The scan shows a joint other than the one the limb is posed about.
+    /// The scan shows another joint than the one the limb is posed about.
     OtherJoint,
-    /// The scan cuts the tibial plateau of a knee.
+    /// The scan cuts off the tibial plateau of a knee.
     PlateauCut,
     /// The axis of a knee runs along the femur, or through femur and tibia.
     KneeAxis,
     /// The scan does not show the back of both condyles of a knee.
     CondylesNotSeen,
-    /// The limb points the opposite way to what the scan's orientation says.
+    /// The limb points the opposite way to the scan's stated orientation.
     ProximalIsInferior,
 }
 
 impl fmt::Display for Severity {
-    /// As in files.
+    /// Writes the name used in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)
     }
 }
 
 impl fmt::Display for FindingCode {
-    /// As in files.
+    /// Writes the name used in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)
     }
@@ -110,14 +110,14 @@ impl fmt::Display for FindingCode {
 pub struct Finding {
     /// Stable code for scripts and for `acknowledged` in a case.
     pub code: FindingCode,
-    /// How much it matters.
+    /// Its severity.
     pub severity: Severity,
     /// What was found and expected, in one sentence with units.
     pub text: String,
-    /// The number that was compared with a limit; its unit is in `text`.
+    /// The number that was compared with a limit; `text` gives its unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Where it is: a point in the ct frame (LPS), mm.
+    /// Its place: a point in the ct frame (LPS), mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub place_mm: Option<[f64; 3]>,
 }
@@ -130,13 +130,13 @@ pub struct LimbFinding {
     pub limb: LimbId,
     /// Whether the case acknowledges it by name.
     pub acknowledged: bool,
-    /// What was found.
+    /// The finding itself.
     #[serde(flatten)]
     pub finding: Finding,
 }
 
 impl Finding {
-    /// A severe one as commands repeat it, of a limb by its name; `more` is how many findings of the same code the limb has besides.
+    /// The line in which commands repeat a severe finding of the limb named `limb`, which has `more` further findings of the same code.
     pub fn repeated(&self, limb: &str, more: usize) -> String {
         let more = match more {
             0 => String::new(),
@@ -150,13 +150,13 @@ impl Finding {
 }
 
 impl LimbFinding {
-    /// Whether commands have to repeat it: severe, and not acknowledged.
+    /// Whether commands have to repeat the finding: it is severe and not acknowledged.
     pub fn is_open(&self) -> bool {
         self.finding.severity == Severity::Severe && !self.acknowledged
     }
 }
 
-/// The findings of a dataset: `findings.json`, absent where there are none.
+/// The findings of a dataset, `findings.json`; there is no file if there are none.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Findings(pub Vec<LimbFinding>);
@@ -170,7 +170,7 @@ impl Findings {
         self.0.is_empty()
     }
 
-    /// Reads the findings of the dataset in `root`; none where the file is absent.
+    /// Reads the findings of the dataset in `root`; none if the file is absent.
     ///
     /// # Errors
     /// [`FileError`] when the file cannot be read or is malformed.
@@ -185,7 +185,7 @@ impl Findings {
         Self::of_text(&read_text(&path)?, &path)
     }
 
-    /// The findings in the text of a `findings.json`, which was read from `path`.
+    /// Parses the text of a `findings.json` that was read from `path`.
     ///
     /// # Errors
     /// [`FileError`] when it is malformed.
@@ -193,10 +193,10 @@ impl Findings {
         serde_json::from_str(text).map_err(|e| FileError::at("parse", path)(io::Error::from(e)))
     }
 
-    /// The open findings of datasets that are about to be used, one line for each code and limb; a dataset that is named twice is read once.
+    /// The open findings of several datasets, one line for each code and limb; a dataset named twice is read once.
     ///
     /// # Errors
-    /// As [`Findings::read`].
+    /// The same as [`Findings::read`].
     pub fn open_lines_of<'a>(
         datasets: impl IntoIterator<Item = &'a Path>,
     ) -> Result<Vec<String>, FileError> {
@@ -235,7 +235,7 @@ impl Findings {
         serde_json::to_string_pretty(self).expect("findings hold only JSON values")
     }
 
-    /// Adds the findings of one pose of `limb`, but those that stand here already.
+    /// Adds the findings of one pose of `limb` that are not listed already.
     pub fn add(&mut self, limb: LimbId, acknowledged: &[FindingCode], of_pose: &[Finding]) {
         for finding in of_pose {
             let same = |known: &LimbFinding| known.limb == limb && known.finding == *finding;

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
 
-/// One limb of one person: the unit of everything below `patient_N/*/{l,r}`.
+/// One limb of one person, whose files are below `patient_N/*/{l,r}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LimbId {
     /// N of `patient_N`.
@@ -36,7 +36,7 @@ impl LimbId {
         self.side.letter()
     }
 
-    /// Name of a pose of this limb, as `patient_0_r_036`.
+    /// Name of a pose of this limb, such as `patient_0_r_036`.
     pub fn unit_name(self, step: u32) -> String {
         format!("patient_{}_{}_{step:03}", self.patient, self.side_letter())
     }
@@ -45,7 +45,7 @@ impl LimbId {
         format!("patient_{}/{kind}/{}", self.patient, self.side_letter())
     }
 
-    /// The file name of a depth image, the key of `roi_depth.json`.
+    /// The file name of a depth image, used as the key in `roi_depth.json`.
     pub fn depth_name(view: View, step: u32) -> String {
         format!("depth_{}_{}.png", view.name(), angle_text(step))
     }
@@ -72,7 +72,7 @@ impl LimbId {
     }
 }
 
-/// The angle of a step as it stands in file names: `step / 2` degrees with one decimal.
+/// The angle of a step as written in file names: `step / 2` degrees with one decimal.
 pub fn angle_text(step: u32) -> String {
     format!(
         "{}.{}",

@@ -1,7 +1,7 @@
 //! Datasets of paired depth images and radiographs: layout, manifest, labels, splits, export.
 //!
 //! [`layout`] names the files as the paper's authors published them; a [`Manifest`] lists the images of a dataset with hash,
-//! seed, transforms and settings. [`published`] reads datasets, ours and those of the authors, as rows for training, and
+//! seed, transforms and settings. [`published`] reads our datasets and those of the authors as rows for training, and
 //! converts them; [`labels`] reads and writes labels; a [`Split`] divides persons into parts; [`export`] writes tables,
 //! metadata and archives for other programs.
 //!

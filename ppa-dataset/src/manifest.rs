@@ -12,10 +12,10 @@ use crate::body_shape::BodyShape;
 use crate::files::{FileError, read_text};
 use crate::layout::{LimbId, View};
 
-/// What all images of a dataset share: settings, cameras, program.
+/// File with the settings, cameras and program common to all images of a dataset.
 pub const DESCRIPTION_FILE: &str = "dataset.json";
 
-/// What a file is.
+/// Kind of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FileKind {
@@ -34,7 +34,7 @@ pub struct FileRow {
     pub file: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
-    /// What it is.
+    /// Its kind.
     pub kind: FileKind,
     /// Person and side.
     #[serde(flatten)]
@@ -48,14 +48,14 @@ pub struct FileRow {
     pub camera: Option<View>,
     /// Body shape; radiographs show the scan itself.
     pub shape: BodyShape,
-    /// Depth images of other body shapes: how much more volume this skin encloses than that of the scan, mm³.
+    /// Depth images of other body shapes: how much more volume the skin encloses than that of the scan, mm³.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub volume_change_mm3: Option<f64>,
-    /// Depth images: pixels that see something beyond the 65.535 m that 16 bits hold, 0 in the file.
+    /// Depth images: pixels that see something beyond the 65.535 m that fit in 16 bits; they are 0 in the file.
     #[serde(skip_serializing_if = "is_zero", default)]
     pub too_far_pixels: usize,
     /// Share of the image's region of interest where the field of view of the scan cuts off the limb: pixels of a depth image that see the
-    /// cut, or rays of a radiograph that pass through it. Left out where it is 0.
+    /// cut, or rays of a radiograph that pass through it. Left out if it is 0.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub cut_share: Option<f64>,
     /// The limb's frame in the scan: T^P_CT.
@@ -65,7 +65,7 @@ pub struct FileRow {
     /// Radiographs: pose of the x-ray device in the scan.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub ct_from_device: Option<TransformRows>,
-    /// Radiographs: tube load that the noise of the image corresponds to, mAs; left out for the expected image and where the fluence of the
+    /// Radiographs: tube load that corresponds to the noise of the image, mAs; left out for the expected image and if the fluence of the
     /// tube is unknown.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub mas: Option<f64>,
@@ -86,7 +86,7 @@ fn is_zero(count: &usize) -> bool {
 }
 
 impl FileRow {
-    /// Whether the row fits the layout: its angle on the grid, its file where such an image lies.
+    /// Checks that the row fits the layout: its angle is on the grid, its path is that of such an image.
     pub fn check(&self) -> Result<(), String> {
         let (step, angle) = (self.step, self.angle_deg);
         if angle != f64::from(step) / 2.0 {
@@ -122,7 +122,7 @@ pub struct RoiRow {
     pub size: u32,
 }
 
-/// `roi_depth.json`: depth image name to region; the same for all body shapes.
+/// `roi_depth.json`: maps the name of a depth image to its region; the same for all body shapes.
 pub type RoiFile = BTreeMap<String, RoiRow>;
 
 /// `roi_depth.json` as text.
@@ -187,7 +187,7 @@ impl Manifest {
             .map_err(|e| FileError::at("parse", &path)(e.into()))
     }
 
-    /// The limbs in it, in order.
+    /// The limbs in the manifest, in order.
     pub fn limbs(&self) -> Vec<LimbId> {
         let mut limbs: Vec<_> = self.files.iter().map(|row| row.limb).collect();
         limbs.sort_unstable();

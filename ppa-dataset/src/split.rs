@@ -1,6 +1,6 @@
 //! Persons for training and persons for testing: `splits/*.json`.
 //!
-//! A split is by person, never by image or foot: poses of one foot are alike, and so are both feet of one person.
+//! A split is by person, never by image or foot: poses of one foot are alike, and so are the two feet of a person.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,10 +22,10 @@ const FOLDER: &str = "splits";
 pub struct Split {
     /// Format of this file; 1.
     pub version: u32,
-    /// What the persons were drawn with; absent where somebody chose them.
+    /// Seed that the persons were drawn with; absent if somebody chose them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// N of `patient_N` for each part, as `train`, `val`, `test`.
+    /// N of `patient_N` for each part, such as `train`, `val`, `test`.
     pub parts: BTreeMap<String, Vec<u32>>,
 }
 
@@ -39,7 +39,7 @@ pub enum SplitError {
     /// The file is of another format version.
     #[error("the split has version {0}; this program reads version 1")]
     Version(u32),
-    /// A person in two parts: what is tested was trained on.
+    /// A person in two parts: a model would be tested on persons it was trained on.
     #[error("patient {patient} is in {first} and in {second}: a person must be in one part only")]
     Leak {
         /// The person.
@@ -52,7 +52,7 @@ pub enum SplitError {
     /// A person of the dataset in no part.
     #[error("patient {0} is not in any part of the split")]
     Unassigned(u32),
-    /// A person that the dataset does not hold.
+    /// A person that is not in the dataset.
     #[error("patient {patient} of part {part} is not in the dataset")]
     Unknown {
         /// The person.
@@ -70,10 +70,10 @@ pub enum SplitError {
 
 impl Split {
     /// Draws the persons of each part. Shares are taken relative to their sum and rounded to whole persons, the largest
-    /// remainder first; the same seed orders the same persons alike, whichever others there are.
+    /// remainder first; a seed gives two persons the same relative order regardless of the others.
     ///
     /// # Errors
-    /// [`SplitError::Shares`] for shares that are not positive, a name twice, or a part that would stay empty.
+    /// [`SplitError::Shares`] for shares that are not positive, a name given twice, or a part that would be empty.
     pub fn draw(patients: &[u32], shares: &[(String, f64)], seed: u64) -> Result<Self, SplitError> {
         shares.iter().try_for_each(|(name, _)| check_name(name))?;
         let counts = counts(patients.len(), shares)?;
@@ -97,7 +97,7 @@ impl Split {
     /// Reads a split.
     ///
     /// # Errors
-    /// [`SplitError`]; a person in two parts is refused here already.
+    /// [`SplitError`], including a person in two parts.
     pub fn read(path: &Path) -> Result<Self, SplitError> {
         let parsed = serde_json::from_str(&read_text(path)?);
         let split: Self = parsed.map_err(|e| FileError::at("parse", path)(e.into()))?;
@@ -109,7 +109,7 @@ impl Split {
         Ok(split)
     }
 
-    /// Writes it to [`Split::path`], whole or not at all, and its hash to `labels.sha256`.
+    /// Writes the split to [`Split::path`], completely or not at all, and its hash to `labels.sha256`.
     ///
     /// # Errors
     /// [`FileError`] when it cannot be written.
@@ -155,14 +155,14 @@ impl Split {
         Ok(names)
     }
 
-    /// The part of a person.
+    /// The part that a person is in.
     pub fn part_of(&self, patient: u32) -> Option<&str> {
         let mut parts = self.parts.iter();
         let (name, _) = parts.find(|(_, patients)| patients.contains(&patient))?;
         Some(name)
     }
 
-    /// Checks that every person of a dataset is in exactly one part, and that nobody else is.
+    /// Checks that every person of a dataset is in exactly one part, and that the parts hold no other persons.
     ///
     /// # Errors
     /// [`SplitError`] naming the person at fault.
@@ -200,7 +200,7 @@ impl Split {
     }
 }
 
-/// Archives are named after parts: a name must not lead out of their folder, nor look like an option or a formula.
+/// Archives are named after parts: a name must not lead out of their folder or look like an option or a formula.
 fn check_name(name: &str) -> Result<(), SplitError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     match !name.is_empty() && !name.starts_with('-') && name.chars().all(plain) {
@@ -209,12 +209,12 @@ fn check_name(name: &str) -> Result<(), SplitError> {
     }
 }
 
-/// Where a person stands in the order of a seed.
+/// Sort key of a person for a seed.
 fn draw(seed: u64, patient: u32) -> [u8; 32] {
     Sha256::digest(format!("{seed}/split/{patient}").as_bytes()).into()
 }
 
-/// Persons of each part.
+/// Number of persons in each part.
 fn counts(patients: usize, shares: &[(String, f64)]) -> Result<Vec<usize>, SplitError> {
     let wrong = |text: String| Err(SplitError::Shares(text));
     for (i, (name, share)) in shares.iter().enumerate() {

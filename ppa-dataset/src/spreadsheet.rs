@@ -1,9 +1,9 @@
 //! Cells of a CSV file that spreadsheet programs would run as formulas.
 
-/// Whether spreadsheet programs run a text as a formula when they open a CSV file: quoting does not stop them.
+/// Whether spreadsheet programs run a text as a formula when they open a CSV file; quoting does not prevent this.
 ///
-/// Names that come from outside and go into a table that is read back are refused where this holds; where a table is only
-/// for people, an apostrophe in front keeps the cell a text.
+/// Names from outside that go into a table that is read back are rejected if this is true; in a table that is only for people,
+/// a leading apostrophe keeps the cell a text.
 pub fn is_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@', '\t', '\r'])
 }

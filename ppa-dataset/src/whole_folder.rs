@@ -1,4 +1,4 @@
-//! Folders that appear whole or not at all.
+//! Folders written completely or not at all.
 
 use std::fs;
 use std::io;
@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::files::FileError;
 
-/// Fills a hidden folder beside `to` and gives it that name when it is finished.
+/// Fills a hidden folder next to `to` and renames it to `to` when it is finished.
 ///
-/// Refuses a `to` that holds something. Whatever fails, nothing is left behind.
+/// Rejects an existing `to` unless it is an empty folder. If anything fails, nothing is left behind.
 pub fn write_whole_folder<T, E: From<FileError>>(
     to: &Path,
     fill: impl FnOnce(&Path) -> Result<T, E>,
@@ -30,13 +30,13 @@ pub fn write_whole_folder<T, E: From<FileError>>(
         renamed.map(|()| filled).map_err(E::from)
     });
     if filled.is_err() {
-        // What failed first is what counts.
+        // The first error counts.
         let _ = clear();
     }
     filled
 }
 
-/// Brings all files below a folder to the disk: a name must not outlive a power cut without them.
+/// Syncs all files below a folder to disk: after a power cut, no name may exist without its contents.
 fn sync(folder: &Path) -> Result<(), FileError> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     for entry in entries.map_err(FileError::at("read", folder))? {
@@ -44,7 +44,7 @@ fn sync(folder: &Path) -> Result<(), FileError> {
         if path.is_dir() {
             sync(&path)?;
         } else {
-            // A copy keeps the mode: what may only be read is opened for that.
+            // A copied file keeps its mode, so a read-only one is opened for reading.
             let opened = fs::OpenOptions::new().append(true).open(&path);
             let opened = opened.or_else(|_| fs::File::open(&path));
             let synced = opened.and_then(|file| file.sync_all());

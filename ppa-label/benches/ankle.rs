@@ -1,4 +1,4 @@
-//! The computed label of an ankle: bones separated, joint space found, openness to one exposure. Processor seconds of all threads.
+//! The computed label of an ankle: separation of the bones, joint space, openness to one exposure. CPU seconds of all threads.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Vector3};

@@ -1,4 +1,4 @@
-//! Separates the bones of an ankle in a scan and grades two exposures by how open they show the joint space.
+//! Separates the bones of an ankle in a scan and grades two exposures by how open the joint space is in them.
 //!
 //! `cargo run -p ppa-label --example label_ankle`
 
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let joint = leg.truth().joint_centre;
     let reach = Vector3::repeat(62.0);
     let scan = leg.voxelise_box([joint - reach, joint + reach], 1.0, TableTop::Absent)?;
-    // A patient who lies as the scan does: y anterior, z proximal, x to the patient's right.
+    // A patient aligned with the scan: y anterior, z proximal, x to the patient's right.
     let axes = Matrix3::from_columns(&[-Vector3::x(), -Vector3::y(), Vector3::z()]);
     let axes = Rotation3::from_matrix_unchecked(axes);
     let ct_from_patient = Isometry3::from_parts(joint.coords.into(), axes.into());
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let found = segment_bones(&scan, &limb, &ct_from_patient)?;
     let bones = AnkleBones::new(&found.grid, &found.labels, BoneNumbers::default(), &joint)?;
     let space = JointSpace::new(bones, &ct_from_patient)?;
-    // The tube is 1 m in front of the leg; moving it outwards is turning the limb inwards.
+    // The tube is 1 m in front of the leg; moving it outwards is equivalent to rotating the limb inwards.
     let exposure = |degrees: f64| {
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -degrees.to_radians());
         let from_front = Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]);

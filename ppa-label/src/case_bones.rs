@@ -1,4 +1,4 @@
-//! Bones of a case, checked when the case is prepared rather than when its dataset is labelled.
+//! Checks of a case's bones when the case is prepared rather than when its dataset is labelled.
 
 use std::path::{Path, PathBuf};
 
@@ -21,25 +21,25 @@ pub enum CaseBonesError {
         "the scan was prepared as a knee, but bones are used only for the labels of ankles: prepare it without bones"
     )]
     Knee,
-    /// The file that labels them.
+    /// The file that labels the bones.
     #[error(transparent)]
     File(#[from] BoneFileError),
-    /// They were not separated.
+    /// The bones could not be separated.
     #[error(transparent)]
     Segment(#[from] SegmentError),
-    /// One of them is missing.
+    /// A bone is missing.
     #[error(transparent)]
     Bones(#[from] BonesError),
-    /// Their joint space.
+    /// No joint space was found between the bones.
     #[error(transparent)]
     JointSpace(#[from] JointSpaceError),
-    /// Their voxels.
+    /// The volume of the bones is invalid.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// The name of the file for segmented bones tells no format.
+    /// The name of the file for segmented bones does not determine a format.
     #[error(transparent)]
     Name(#[from] WriteError),
-    /// The name of the file for segmented bones stands for a DICOM folder.
+    /// The name of the file for segmented bones would be a DICOM folder.
     #[error(
         "{} would be a DICOM CT in Hounsfield units, but labels are numbers of bones: write NIfTI, NRRD or MetaImage",
         .0.display()
@@ -57,7 +57,7 @@ fn require_ankle(landmarks: &Landmarks) -> Result<(), CaseBonesError> {
     }
 }
 
-/// Refuses a file that does not label the bones around the joint of a limb.
+/// Checks that a file labels the bones around the joint of a limb.
 ///
 /// # Errors
 /// [`CaseBonesError`] for knees, files that cannot be read, and bones that are missing near the joint.
@@ -67,11 +67,11 @@ pub fn check_bones(file: &BoneFile, landmarks: &Landmarks) -> Result<(), CaseBon
     Ok(())
 }
 
-/// The bones that can be separated in a scan, numbered by [`BoneNumbers::default`], once it is sure that labels can be computed from
-/// them; `limb` says of each voxel whether it belongs to the limb.
+/// Separates the bones in a scan, numbered by [`BoneNumbers::default`], and checks that labels can be computed from them; `limb`
+/// states for each voxel whether it belongs to the limb.
 ///
 /// # Errors
-/// [`CaseBonesError`] for knees, and bones that touch or are missing, with the place.
+/// [`CaseBonesError`] for knees, and for bones that touch or are missing, with the place.
 pub fn segment_checked_bones(
     volume: &Volume,
     limb: &[bool],
@@ -88,7 +88,7 @@ pub fn segment_checked_bones(
     Ok(bones.volume()?)
 }
 
-/// Refuses names for segmented bones under which they could not be found later, or which would overwrite the scan.
+/// Rejects names for segmented bones under which they could not be found later, or which would overwrite the scan.
 ///
 /// # Errors
 /// [`CaseBonesError::Name`], [`CaseBonesError::Dicom`] or [`CaseBonesError::Scan`].

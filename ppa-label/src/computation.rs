@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::openness::{FREE_CHORDS_MM, LabelScale};
 
-/// Everything that labels of the same radiographs depend on.
+/// Everything that the labels of the same radiographs depend on.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Computation<'a> {
     pub label_source: LabelSource,
@@ -19,7 +19,7 @@ pub(super) struct Computation<'a> {
 
 #[derive(Debug, Clone, Copy, Serialize)]
 struct ComputedFrom<'a> {
-    /// Over size, affine and numbers: the name of the file stays out of datasets.
+    /// Hash of size, affine and numbers: the file name does not enter datasets.
     sha256: &'a str,
     numbers: BoneNumbers,
     segmented: bool,

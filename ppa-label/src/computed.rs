@@ -22,10 +22,10 @@ use super::openness::{
 use super::table::table_bytes;
 use super::tallies::TalliesError;
 
-/// What was computed for one radiograph; a row of `openness.csv`.
+/// Results for one radiograph; a row of `openness.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComputedRow {
-    /// The radiograph, from the dataset's root.
+    /// Path of the radiograph from the dataset's root.
     pub image: String,
     /// Half degrees of medial rotation.
     pub step: u32,
@@ -33,31 +33,31 @@ pub struct ComputedRow {
     pub angle_deg: f64,
     /// Openness of the medial gutter, 0 to 1.
     pub medial: f64,
-    /// Of the superior one.
+    /// Openness of the superior gutter.
     pub superior: f64,
-    /// Of the lateral one.
+    /// Openness of the lateral gutter.
     pub lateral: f64,
-    /// Share of the medial gutter's height at which the malleolus covers the talus, see [`Hidden`](super::Hidden).
+    /// Share of the medial gutter's height over which the malleolus covers the talus, see [`Hidden`](super::Hidden).
     pub medial_hidden_share: f64,
-    /// By how many mm it does, median over that height.
+    /// Width of that overlap, median over the gutter's height, mm.
     pub medial_hidden_mm: f64,
-    /// The same of the lateral gutter.
+    /// The same share for the lateral gutter.
     pub lateral_hidden_share: f64,
-    /// The same of the lateral gutter.
+    /// The same width for the lateral gutter.
     pub lateral_hidden_mm: f64,
     /// Grade of the medial gutter alone.
     pub medial_grade: f64,
-    /// Of the superior one.
+    /// Grade of the superior gutter alone.
     pub superior_grade: f64,
-    /// Of the lateral one.
+    /// Grade of the lateral gutter alone.
     pub lateral_grade: f64,
-    /// How good the worst gutter is before it is graded, 0 to 1.
+    /// Quality of the worst gutter before grading, 0 to 1.
     pub worst: f64,
     /// Grade from 1 to 3 in half steps.
     pub label: f64,
-    /// Half the range that other tolerances and thresholds give.
+    /// Half the range of grades under other tolerances and thresholds.
     pub std: f64,
-    /// See [`Overlaps`](super::Overlaps), as the next six.
+    /// See [`Overlaps`](super::Overlaps) for this and the next six.
     pub tibiofibular_overlap_mm: Option<f64>,
     /// Floor of the incisura to fibula.
     pub tibiofibular_clear_space_mm: Option<f64>,
@@ -69,17 +69,17 @@ pub struct ComputedRow {
     pub medial_malleolus_overlap_mm: Option<f64>,
     /// Lateral malleolus over talus.
     pub lateral_malleolus_overlap_mm: Option<f64>,
-    /// Medial above lateral crest of the trochlea.
+    /// Height of the medial above the lateral crest of the trochlea.
     pub talar_crest_offset_mm: f64,
-    /// How well the radiograph shows the medial gutter, see [`Visibility`](super::Visibility); as the next two.
+    /// Visibility of the medial gutter in the radiograph, see [`Visibility`](super::Visibility).
     pub medial_visibility: f64,
-    /// The superior one.
+    /// Visibility of the superior gutter.
     pub superior_visibility: f64,
-    /// The lateral one.
+    /// Visibility of the lateral gutter.
     pub lateral_visibility: f64,
 }
 
-/// What [`ComputedLabels::write`] did.
+/// Summary of [`ComputedLabels::write`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LabelledLimb {
     /// The limb.
@@ -87,13 +87,13 @@ pub struct LabelledLimb {
     pub limb: LimbId,
     /// Radiographs that were graded.
     pub radiographs: usize,
-    /// How many of them are diagnostic, below 2.5.
+    /// Number of diagnostic ones, below 2.5.
     pub diagnostic: usize,
-    /// Rotation at which the worst gutter is best: the middle of what reaches nine tenths of the best.
+    /// Rotation at which the worst gutter is best: the mean of the rotations that reach nine tenths of the best.
     pub best_angle_deg: f64,
-    /// Radiographs whose label in `labels.json` is that of readers.
+    /// Radiographs whose label in `labels.json` comes from readers.
     pub of_readers: usize,
-    /// Whether `labels.json` holds labels without a source, and was left as it is.
+    /// Whether `labels.json` contains labels without a source and was left unchanged.
     pub unnamed_kept: bool,
 }
 
@@ -109,7 +109,7 @@ pub enum AutoLabelError {
         "the case of {0} does not specify bones: create it again with `ppa prepare --bones` or `--segment-bones`"
     )]
     NoBones(LimbId),
-    /// The dataset shows no radiographs of the limb.
+    /// The dataset lists no radiographs of the limb.
     #[error("{} lists no radiographs of {limb}", root.display())]
     NoRadiographs {
         /// The dataset.
@@ -120,7 +120,7 @@ pub enum AutoLabelError {
     /// The dataset was made from another scan.
     #[error("the radiographs of {0} were not made from the scan of the case")]
     OtherScan(LimbId),
-    /// A radiograph without a pose of the device, or with one that is none.
+    /// A radiograph with a missing or invalid pose of the device.
     #[error("{file} has no usable {what} in the manifest")]
     Pose {
         /// The radiograph.
@@ -137,12 +137,12 @@ pub enum AutoLabelError {
     /// The bones.
     #[error(transparent)]
     Bones(#[from] BoneFileError),
-    /// Their joint space.
+    /// The bones have no usable joint space.
     #[error("bones of {limb}")]
     JointSpace {
         /// The limb.
         limb: LimbId,
-        /// What is wrong with it.
+        /// The error.
         source: JointSpaceError,
     },
     /// The tallies of a radiograph.
@@ -151,13 +151,13 @@ pub enum AutoLabelError {
     /// The thresholds.
     #[error(transparent)]
     Scale(#[from] ScaleError),
-    /// The name of the file that keeps computed labels where readers graded as well.
+    /// A name of labels that is reserved for the file of all computed labels.
     #[error("labels.computed.json belongs to labels.json: choose a name other than {0}")]
     ReservedName(LabelName),
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Labels that are there are none.
+    /// The existing labels are invalid.
     #[error(transparent)]
     Labels(#[from] LabelFileError),
     /// A label off the grid.
@@ -165,7 +165,7 @@ pub enum AutoLabelError {
     Label(#[from] LabelError),
 }
 
-/// Labels of a limb that are computed and not written yet.
+/// Computed labels of a limb that are not written yet.
 #[derive(Debug, Clone)]
 pub struct ComputedLabels<'a> {
     manifest: &'a Manifest,
@@ -179,20 +179,20 @@ pub struct ComputedLabels<'a> {
 /// Where labels are written.
 #[derive(Debug, Clone)]
 enum Target {
-    /// `labels.json`, as it was found, and beside it `labels.computed.json`.
+    /// `labels.json` as it was found, with `labels.computed.json` next to it.
     Default(LabelFile),
     /// `labels.NAME.json`.
     Named(LabelName),
 }
 
-/// What computed labels need to know of the case of a limb.
+/// The parts of a limb's case that computed labels need.
 #[derive(Debug, Clone, Copy)]
 pub struct CaseBones<'a> {
-    /// The kind of limb that the case gives, if it does.
+    /// The kind of limb, if the case states it.
     pub limb_kind: Option<LimbKind>,
     /// The file that labels its bones.
     pub file: Option<&'a BoneFile>,
-    /// Identity of its scan.
+    /// Hash of its scan.
     pub volume_sha256: &'a str,
 }
 
@@ -239,7 +239,7 @@ pub fn compute_labels<'a>(
 }
 
 impl ComputedLabels<'_> {
-    /// Refuses to replace results of an earlier computation that differ from these.
+    /// Checks that writing would not replace results of an earlier computation that differ from these.
     ///
     /// # Errors
     /// [`AutoLabelError::Differs`] naming the file.
@@ -253,7 +253,7 @@ impl ComputedLabels<'_> {
         let Target::Default(before) = &self.target else {
             return Ok(());
         };
-        // Computed labels had no file of their own in earlier versions.
+        // Earlier versions stored no separate file of computed labels.
         let before = before.computed();
         let same = |row: &LabelRow| {
             self.labels.of_step(row.step) == Some(row)
@@ -268,10 +268,10 @@ impl ComputedLabels<'_> {
         }
     }
 
-    /// Writes `openness.csv`, `openness.json` (what it was computed with), `labels.computed.json` (all labels) and `labels.json`
-    /// beside the limb's regions of interest, and their hashes to `labels.sha256`. In `labels.json` labels of readers stay, and computed ones stand where there are none; a
-    /// file of labels without a source stays as it is. Labels with a name go to `openness.NAME.csv`, `openness.NAME.json` and
-    /// `labels.NAME.json`; `labels.json` stays as it is.
+    /// Writes `openness.csv`, `openness.json` (settings of the computation), `labels.computed.json` (all labels) and `labels.json` next to
+    /// the limb's regions of interest, and their hashes to `labels.sha256`. In `labels.json`, readers' labels are kept, and computed ones
+    /// fill the gaps; a file that contains labels without a source is left unchanged. Labels with a name go to `openness.NAME.csv`,
+    /// `openness.NAME.json` and `labels.NAME.json`; `labels.json` is left unchanged.
     ///
     /// # Errors
     /// [`AutoLabelError`] if a file cannot be written.
@@ -303,7 +303,7 @@ impl ComputedLabels<'_> {
         })
     }
 
-    /// The files that hold nothing but what was computed.
+    /// The files that contain only computed data.
     fn own_files(&self) -> [(PathBuf, Vec<u8>); 3] {
         let (root, limb) = (&self.manifest.root, self.limb);
         let (labels, stem) = match &self.target {
@@ -414,7 +414,7 @@ fn pose(
     })
 }
 
-/// The middle of the rotations at which the worst gutter reaches at least nine tenths of the best: both flanks are steep.
+/// Mean of the rotations at which the worst gutter reaches at least nine tenths of the best: both flanks are steep.
 fn best_angle_deg(rows: &[ComputedRow]) -> f64 {
     let most = rows.iter().map(|row| row.worst).fold(0.0, f64::max);
     let near = rows.iter().filter(|row| row.worst >= 0.9 * most);

@@ -1,4 +1,4 @@
-//! Data of a dataset, besides its manifest, that computed labels need.
+//! Data of a dataset, in addition to its manifest, that computed labels need.
 
 use nalgebra::Isometry3;
 use ppa_dataset::files::{FileError, read_text};
@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::openness::{JointSpace, Reading, Visibility};
 use super::tallies::{Tallies, TalliesError};
 
-/// What `dataset.json` states about detector and scans.
+/// The part of `dataset.json` that describes detector and scans.
 #[derive(Deserialize)]
 pub(super) struct Described {
     source_detector_mm: f64,
@@ -49,7 +49,7 @@ impl Described {
         found.map(|found| found.volume_sha256.as_str())
     }
 
-    /// How well a radiograph shows the gutters, by its tallies.
+    /// Visibility of the gutters in a radiograph, computed from its tallies.
     pub fn visibility(
         &self,
         manifest: &Manifest,

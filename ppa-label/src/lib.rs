@@ -1,15 +1,15 @@
 //! Labels of poses: grades of readers, and labels computed from the bones of an ankle.
 //!
-//! Readers see the radiographs of a dataset as [`ReaderCase`]s on a [`grading_page`], or one by one where a program keeps their [`GradeSheet`];
-//! [`import_grades`] turns their grades into labels;
-//! [`read_grade_tables`] collects grades by image, for statistics of agreement.
+//! Readers see the radiographs of a dataset as [`ReaderCase`]s on a [`grading_page`], or one by one in a program that keeps their
+//! [`GradeSheet`]; [`import_grades`] turns their grades into labels; [`read_grade_tables`] collects grades by image, for statistics of
+//! agreement.
 //!
 //! Computed labels measure the alignment of the joint space of an ankle with the beam. They are a surrogate that no reader has
 //! validated.
-//! [`segment_bones`] separates tibia, fibula and talus where no one has done so; [`AnkleBones`] are their surfaces; [`JointSpace`] finds
-//! the three gutters between them; its `openness` follows the rays of an [`Exposure`]; a [`LabelScale`] turns it into a grade;
-//! [`compute_labels`] does so for a dataset, [`PoseLabel`] for one exposure; [`check_bones`] refuses bones of a case from which no labels can be
-//! computed.
+//! [`segment_bones`] separates tibia, fibula and talus if the scan has no labelled bones; [`AnkleBones`] are their surfaces;
+//! [`JointSpace`] finds the three gutters between them; its `openness` follows the rays of an [`Exposure`]; a [`LabelScale`] turns it
+//! into a grade; [`compute_labels`] does so for a dataset, [`PoseLabel`] for one exposure; [`check_bones`] rejects bones of a case from
+//! which no labels can be computed.
 
 mod case_bones;
 mod computation;

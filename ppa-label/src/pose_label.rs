@@ -4,18 +4,18 @@ use serde::Serialize;
 
 use super::openness::{Exposure, JointSpace, JointSpaceError, LabelScale};
 
-/// A grade by a scale, as [`compute_labels`](super::compute_labels) gives it to a radiograph, and what it follows from.
+/// A grade as [`compute_labels`](super::compute_labels) gives it to a radiograph, with the openness it follows from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoseLabel {
     /// 1 (ideal) to 3 (inadequate); diagnostic below 2.5.
     pub label: f64,
-    /// Half the range that other tolerances and thresholds give.
+    /// Half the range of grades under other tolerances and thresholds.
     pub std: f64,
     /// Medial, superior and lateral gutter.
     pub gutters: [GutterLabel; 3],
 }
 
-/// What an exposure shows of a gutter.
+/// Openness and grade of one gutter in an exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GutterLabel {
     /// `medial`, `superior` or `lateral`.
@@ -27,10 +27,10 @@ pub struct GutterLabel {
 }
 
 impl PoseLabel {
-    /// Grades what an exposure shows of a joint space.
+    /// Grades an exposure of a joint space.
     ///
     /// # Errors
-    /// [`JointSpaceError`] as [`JointSpace::openness`].
+    /// The same as [`JointSpace::openness`].
     pub fn new(
         space: &JointSpace,
         exposure: Exposure,

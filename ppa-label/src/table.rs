@@ -7,14 +7,14 @@ use serde::de::DeserializeOwned;
 
 use ppa_dataset::files::{FileError, write_whole};
 
-/// Why a file is not the table that is expected.
+/// Why a file is not the expected table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Its columns or a cell are wrong.
+    /// The columns or a cell are wrong.
     #[error("{} is not the expected table", path.display())]
     Parse {
         /// The file.

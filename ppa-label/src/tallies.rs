@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use exr::prelude::{ReadChannels, ReadLayers, read};
 
-/// A radiograph's tallies cannot be used.
+/// The tallies of a radiograph cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{} holds no tallies of a radiograph: {message}", path.display())]
 pub struct TalliesError {

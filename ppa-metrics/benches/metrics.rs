@@ -1,11 +1,11 @@
 //! The report of one test set, and the exact test from ten seeds to the largest number of pairs.
 //!
-//! Units of work: samples and sign patterns. The seed is the formula.
+//! Units of work: samples and sign patterns. The numbers are computed without a random seed.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ppa_metrics::{evaluate, sign_flip_permutation};
 
-/// Scattered numbers in [0, 1): multiples of the golden ratio.
+/// Deterministic scattered numbers in [0, 1): multiples of the golden ratio.
 fn scattered(count: usize) -> Vec<f64> {
     (1..=count)
         .map(|i| (i as f64 * 0.618_033_988_749_895).fract())

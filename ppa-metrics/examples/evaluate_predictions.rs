@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         report.mae, report.spearman, report.diagnostic_accuracy
     );
 
-    // MAE of five seeds from scratch and with pretraining.
+    // MAE of five seeds, from scratch and with pretraining.
     let (scratch, pretrained) = (
         [0.31, 0.30, 0.35, 0.33, 0.29],
         [0.25, 0.26, 0.27, 0.30, 0.24],

@@ -6,25 +6,25 @@ use serde::Serialize;
 
 use crate::error::{MetricError, check_scores};
 
-/// Predictions count as constant where their standard deviation is below this share of the range of the labels.
+/// Predictions count as constant if their standard deviation is below this share of the range of the labels.
 pub const LEAST_SPREAD: f64 = 0.01;
 
-/// Predictions that are all the same, or nearly so: their metrics are those of a constant.
+/// Predictions that are all the same, or nearly so, with the metrics of a constant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ConstantPrediction {
     /// Number of predictions.
     pub n: usize,
     /// Their mean.
     pub mean: f64,
-    /// Their standard deviation, divided by n.
+    /// Their standard deviation, dividing by n.
     pub std: f64,
     /// Largest label minus smallest label.
     pub label_range: f64,
 }
 
-/// Whether predictions are constant: their standard deviation is 0, or below [`LEAST_SPREAD`] of the range of labels that differ.
+/// Tests whether predictions are constant: their standard deviation is 0, or below [`LEAST_SPREAD`] of the range of the labels.
 ///
-/// `None` where they are not, and where all labels are equal, since a constant is then as good as any answer.
+/// `None` if they are not, or if all labels are equal, since a constant is then as good as any answer.
 ///
 /// # Errors
 /// [`MetricError`] for empty, unequal or non-finite input.
@@ -102,7 +102,7 @@ mod tests {
     }
 
     proptest! {
-        /// Offset and scale of both together change nothing.
+        /// A common offset and scale change nothing.
         #[test]
         fn units_do_not_matter(spread in 0.0..0.04_f64, shift in -5.0..5.0_f64, scale in 0.1..10.0_f64) {
             prop_assume!((spread - 0.02).abs() > 1e-6);

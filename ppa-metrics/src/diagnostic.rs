@@ -3,10 +3,10 @@
 use crate::error::{MetricError, check_scores};
 use crate::regression::mean_score;
 
-/// Quality from which on a pose is non-diagnostic.
+/// Quality at and above which a pose is non-diagnostic.
 pub const NON_DIAGNOSTIC: f64 = 2.5;
 
-/// Diagnostic accuracy: share of pairs that lie on the same side of 2.5 (2.5 itself is non-diagnostic).
+/// Diagnostic accuracy: share of pairs on the same side of 2.5 (2.5 itself is non-diagnostic).
 ///
 /// # Errors
 /// [`MetricError`] for empty, unequal or non-finite input.
@@ -19,7 +19,7 @@ pub fn diagnostic_accuracy(labels: &[f64], predictions: &[f64]) -> Result<f64, M
 /// Sensitivity: share of the non-diagnostic labels (≥ 2.5) whose prediction is non-diagnostic as well.
 ///
 /// # Errors
-/// [`MetricError::NoPositives`] without such a label; empty, unequal or non-finite input.
+/// [`MetricError::NoPositives`] if there is no such label; empty, unequal or non-finite input.
 pub fn sensitivity(labels: &[f64], predictions: &[f64]) -> Result<f64, MetricError> {
     recall(labels, predictions, |quality| quality >= NON_DIAGNOSTIC)?
         .ok_or(MetricError::NoPositives)
@@ -28,12 +28,12 @@ pub fn sensitivity(labels: &[f64], predictions: &[f64]) -> Result<f64, MetricErr
 /// Specificity: share of the diagnostic labels (< 2.5) whose prediction is diagnostic as well.
 ///
 /// # Errors
-/// [`MetricError::NoNegatives`] without such a label; empty, unequal or non-finite input.
+/// [`MetricError::NoNegatives`] if there is no such label; empty, unequal or non-finite input.
 pub fn specificity(labels: &[f64], predictions: &[f64]) -> Result<f64, MetricError> {
     recall(labels, predictions, |quality| quality < NON_DIAGNOSTIC)?.ok_or(MetricError::NoNegatives)
 }
 
-/// Share of the labels in a class whose prediction is in it too; `None` if no label is.
+/// Share of the labels in a class whose prediction is also in it; `None` if no label is.
 fn recall(
     labels: &[f64],
     predictions: &[f64],

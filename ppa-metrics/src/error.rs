@@ -7,14 +7,14 @@ pub enum MetricError {
     /// Nothing to average.
     #[error("no {0}: a metric needs at least one")]
     Empty(&'static str),
-    /// Two lists that belong together differ in length.
+    /// Two lists that belong together have different lengths.
     #[error("expected as many {first} as {second}, found {first_count} and {second_count}")]
     Length {
-        /// What the first list holds.
+        /// Content of the first list.
         first: &'static str,
         /// Its length.
         first_count: usize,
-        /// What the second list holds.
+        /// Content of the second list.
         second: &'static str,
         /// Its length.
         second_count: usize,
@@ -22,11 +22,11 @@ pub enum MetricError {
     /// Too few of something.
     #[error("the number of {what} is {found}, expected at least {expected}")]
     TooFew {
-        /// Of what.
+        /// What there are too few of.
         what: &'static str,
-        /// How many there are.
+        /// Number found.
         found: usize,
-        /// How many it takes.
+        /// Number required.
         expected: usize,
     },
     /// A value is infinite or NaN.
@@ -45,7 +45,7 @@ pub enum MetricError {
         /// The lowest grade.
         found: f64,
     },
-    /// All values are the same, so there is nothing that could correlate.
+    /// All values are the same, so the correlation is undefined.
     #[error("all {count} {what} are {value}: a correlation needs two different values")]
     Constant {
         /// Which list.
@@ -55,10 +55,10 @@ pub enum MetricError {
         /// The value.
         value: f64,
     },
-    /// No label is non-diagnostic, so there is no sensitivity.
+    /// No label is non-diagnostic, so sensitivity is undefined.
     #[error("no label is non-diagnostic (2.5 or above), so sensitivity is not defined")]
     NoPositives,
-    /// No label is diagnostic, so there is no specificity.
+    /// No label is diagnostic, so specificity is undefined.
     #[error("no label is diagnostic (below 2.5), so specificity is not defined")]
     NoNegatives,
     /// A seed with more or fewer folds than the first.
@@ -68,22 +68,22 @@ pub enum MetricError {
     UnequalFolds {
         /// The seed.
         seed: u64,
-        /// Rows it has.
+        /// Number of its rows.
         found: usize,
-        /// Rows of the first seed.
+        /// Number of rows of the first seed.
         expected: usize,
     },
-    /// More pairs than the exact test counts.
+    /// More pairs than the exact test supports.
     #[error("{found} pairs, expected at most {max}: the exact test counts all 2^n sign patterns")]
     TooManyPairs {
         /// Pairs found.
         found: usize,
-        /// Most that are counted.
+        /// Largest number supported.
         max: usize,
     },
 }
 
-/// Refuses an empty list and values that are not finite.
+/// Returns an error for an empty list and for values that are not finite.
 pub(crate) fn check_values(what: &'static str, values: &[f64]) -> Result<(), MetricError> {
     if values.is_empty() {
         return Err(MetricError::Empty(what));
@@ -98,7 +98,7 @@ pub(crate) fn check_values(what: &'static str, values: &[f64]) -> Result<(), Met
     }
 }
 
-/// [`check_values`] of two lists, and that they are equally long.
+/// [`check_values`] of two lists, which must have the same length.
 pub(crate) fn check_pair(
     first: (&'static str, &[f64]),
     second: (&'static str, &[f64]),

@@ -1,17 +1,16 @@
 //! Metrics of pose assessment, as Laufer et al., MELBA 2026:027 (doi:10.59275/j.melba.2026-c874), define them.
 //!
-//! A *label* x is the quality radiologists gave a pose, from 1 (ideal) to 3 (inadequate), in steps of 0.5; a *prediction* y is the continuous output
-//! of a network. From [`NON_DIAGNOSTIC`] = 2.5 on, a pose is non-diagnostic, which is what "positive" means here. [`evaluate`] gives the whole
-//! [`Report`]; each metric is available by itself as well. Two
-//! cameras or several frames are averaged first ([`mean_per_pose`], [`mean_of_views`]). [`constant_prediction`] finds predictions
-//! that hardly differ, whose metrics mislead.
+//! A *label* x is the quality that radiologists gave a pose, from 1 (ideal) to 3 (inadequate), in steps of 0.5; a *prediction* y is the
+//! continuous output of a network. A pose is non-diagnostic, here called "positive", from [`NON_DIAGNOSTIC`] = 2.5 on. [`evaluate`]
+//! returns all metrics as a [`Report`]; each metric is also available by itself. Predictions of two cameras or several frames are averaged
+//! first ([`mean_per_pose`], [`mean_of_views`]). [`constant_prediction`] detects predictions that hardly differ, whose metrics mislead.
 //!
 //! [`pose_delta`] and [`pose_margin_accuracy`] rank one good against two bad poses ([`PoseTriple`]).
 //! [`sign_flip_permutation`] is the exact paired test on seeds, whose folds [`mean_per_seed`] averages first.
 //!
-//! [`agreement`] measures how far the readers agree whose grades became the labels.
+//! [`agreement`] measures the agreement of the readers whose grades became the labels.
 //!
-//! Every function refuses empty, unequal, infinite or NaN input with a [`MetricError`]; none returns NaN.
+//! Every function returns a [`MetricError`] for empty, unequal, infinite or NaN input; none returns NaN.
 //!
 //! ```
 //! let labels = [1.0, 1.5, 2.5, 3.0];

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::error::{MetricError, check_pair};
 
-/// Most pairs whose 2^n sign patterns are counted.
+/// Largest number of pairs whose 2^n sign patterns are counted.
 pub const MAX_PAIRS: usize = 40;
 
 /// Result of [`sign_flip_permutation`].
@@ -20,13 +20,13 @@ pub struct PermutationTest {
     pub patterns: u64,
 }
 
-/// Exact paired permutation test: if a and b were exchangeable, each difference a − b could as well have the other sign.
+/// Exact paired permutation test: if a and b were exchangeable, each difference a − b could equally have the other sign.
 ///
 /// For the paper's question, whether pretraining lowers the MAE, a is the MAE from scratch and b the MAE with
-/// pretraining, one pair per seed. All 2^n patterns are counted (the observed one included), none is sampled.
+/// pretraining, one pair per seed. All 2^n patterns are counted, including the observed one; none is sampled.
 ///
-/// Sums that are equal in exact arithmetic differ by rounding when added in another order or read from decimals. Sums
-/// within 2 n ε Σ(|a| + |b|) of the observed one, the bound of that rounding, therefore count as equal to it.
+/// Sums that are equal in exact arithmetic differ by rounding when added in another order or read from decimals. Therefore sums
+/// within 2 n ε Σ(|a| + |b|) of the observed one, the bound of that rounding, count as equal to it.
 ///
 /// Half the differences give 2^(n/2) sums each; sorted, they are matched in one pass (Horowitz and Sahni, J. ACM 21,
 /// 1974), which takes milliseconds for n = 24 and a fraction of a second for n = 40.
@@ -89,7 +89,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against plain enumeration with integers, where sums are exact and ties are frequent.
+        /// Compared with plain enumeration of integers, where sums are exact and ties are frequent.
         #[test]
         fn counts_are_those_of_plain_enumeration(pairs in prop::collection::vec((-9..10_i64, -9..10_i64), 1..12)) {
             let observed: i64 = pairs.iter().map(|(a, b)| a - b).sum();
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_direction_is_a_above_b() {
-        // All ten seeds better with pretraining: only the observed pattern reaches the observed sum.
+        // All ten seeds are better with pretraining: only the observed pattern reaches the observed sum.
         let scratch: Vec<f64> = (0..10).map(|seed| 0.30 + 0.001 * f64::from(seed)).collect();
         let pretrained: Vec<f64> = scratch.iter().map(|mae| mae - 0.06).collect();
         let test = sign_flip_permutation(&scratch, &pretrained).unwrap();

@@ -30,7 +30,7 @@ pub fn mean_of_views(first: &[f64], second: &[f64]) -> Result<Vec<f64>, MetricEr
         .collect())
 }
 
-/// Prediction per pose, the mean over its frames; poses may differ in their number of frames.
+/// Prediction per pose, the mean over its frames; poses may have different numbers of frames.
 ///
 /// # Errors
 /// [`MetricError`] for no pose, a pose without frames, or a prediction that is not finite.
@@ -45,7 +45,7 @@ pub fn mean_per_pose<F: AsRef<[f64]>>(poses: &[F]) -> Result<Vec<f64>, MetricErr
     poses.iter().map(|frames| mean(frames.as_ref())).collect()
 }
 
-/// Pose Delta: mean over pairs of (b₁ + b₂)/2 − g. The larger, the better good and bad poses are separated.
+/// Pose Delta: mean over pairs of (b₁ + b₂)/2 − g. Larger values mean better separation of good and bad poses.
 ///
 /// # Errors
 /// [`MetricError`] for empty or non-finite input.

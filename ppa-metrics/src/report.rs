@@ -11,7 +11,7 @@ use crate::spearman::spearman;
 /// The metrics of labelled predictions; serialises to the keys of `ppa metrics --json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Set where the predictions hardly differ: the metrics are then those of a constant.
+    /// Set if the predictions hardly differ: the metrics are then those of a constant.
     pub constant_prediction: Option<ConstantPrediction>,
     /// Number of samples.
     pub n: usize,
@@ -19,19 +19,19 @@ pub struct Report {
     pub mse: f64,
     /// Mean absolute error.
     pub mae: f64,
-    /// Spearman's rank correlation; `None` where labels or predictions are all equal.
+    /// Spearman's rank correlation; `None` if labels or predictions are all equal.
     pub spearman: Option<f64>,
     /// Share with |error| < 0.5.
     pub accuracy: f64,
     /// Share on the label's side of 2.5.
     pub diagnostic_accuracy: f64,
-    /// Share of the non-diagnostic labels that are found; `None` where there is none.
+    /// Share of the non-diagnostic labels that are found; `None` if there is none.
     pub sensitivity: Option<f64>,
-    /// Share of the diagnostic labels that are found; `None` where there is none.
+    /// Share of the diagnostic labels that are found; `None` if there is none.
     pub specificity: Option<f64>,
 }
 
-/// All metrics of predictions against their labels, those that are not defined left open.
+/// Computes all metrics of predictions against their labels; undefined ones are `None`.
 ///
 /// # Errors
 /// [`MetricError`] for empty, unequal or non-finite input.
@@ -49,7 +49,7 @@ pub fn evaluate(labels: &[f64], predictions: &[f64]) -> Result<Report, MetricErr
     })
 }
 
-/// `None` for a metric that usable input leaves undefined.
+/// `None` for a metric that is undefined for valid input.
 fn if_defined(found: Result<f64, MetricError>) -> Result<Option<f64>, MetricError> {
     match found {
         Ok(value) => Ok(Some(value)),

@@ -6,11 +6,11 @@ use crate::error::{MetricError, check_pair};
 
 /// Means of a and b over the rows of each seed, ascending by seed.
 ///
-/// The folds of one cross-validation are parts of the same evaluation and no independent observations: the paper
+/// The folds of one cross-validation are parts of the same evaluation, not independent observations: the paper
 /// averages them within each seed before it tests the seeds (section 5.1).
 ///
 /// # Errors
-/// [`MetricError`] for empty, unequal or non-finite input, and if the seeds do not have the same number of rows: one of
+/// [`MetricError`] for empty, unequal or non-finite input, and if the seeds have different numbers of rows: one of
 /// them would then be the mean of other folds.
 pub fn mean_per_seed(
     seeds: &[u64],

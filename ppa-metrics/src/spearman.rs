@@ -4,8 +4,8 @@ use crate::error::{MetricError, check_scores};
 
 /// Spearman's rank correlation: Pearson's coefficient of the ranks, equal values sharing their mean rank.
 ///
-/// Without equal values this is the paper's 1 − 6 Σ d² / (N (N² − 1)); with them, as quality labels always have, that
-/// formula is off, and this is what SciPy's `spearmanr` gives.
+/// Without equal values this is the paper's 1 − 6 Σ d² / (N (N² − 1)); with ties, which quality labels always have, that
+/// formula is inaccurate, and this function gives the result of SciPy's `spearmanr`.
 ///
 /// # Errors
 /// [`MetricError::Constant`] if either list has only one distinct value; empty, unequal or non-finite input.
@@ -22,11 +22,11 @@ pub fn spearman(labels: &[f64], predictions: &[f64]) -> Result<f64, MetricError>
     }
     let (x, y) = (centred_ranks(labels), centred_ranks(predictions));
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    // One root of the product: lists of the same order give exactly 1.
+    // One root of the product: lists in the same order give exactly 1.
     Ok((dot(&x, &y) / (dot(&x, &x) * dot(&y, &y)).sqrt()).clamp(-1.0, 1.0))
 }
 
-/// Mid-ranks minus their mean (N + 1)/2; multiples of one half, hence exact.
+/// Mid-ranks minus their mean (N + 1)/2; multiples of one half, so exact.
 fn centred_ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_unstable_by(|&a, &b| values[a].total_cmp(&values[b]));

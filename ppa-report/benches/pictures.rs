@@ -1,4 +1,4 @@
-//! The picture of a case and the coverage plot. Processor seconds of all threads.
+//! The picture of a case and the coverage plot. CPU seconds of all threads.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ppa_benches::ProcessorTime;

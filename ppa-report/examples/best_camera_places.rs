@@ -1,4 +1,4 @@
-//! Where above an ankle a depth camera sees most of it, as a plot.
+//! Plots the places above an ankle from which a depth camera sees most of it.
 //!
 //! `cargo run -p ppa-report --example best_camera_places -- [PLOT.png]`
 

@@ -10,17 +10,17 @@ use rayon::prelude::*;
 use crate::chart::{Chart, Mark, Series};
 use crate::embedded::data_uri;
 
-/// HU shown black and white in the slices.
+/// HU shown as black and white in the slices.
 const WINDOW_HU: [f32; 2] = [-1000.0, 600.0];
 /// Most pixels of the page per mm of the body.
 const PIXELS_PER_MM: f64 = 3.0;
-/// Width of the page that the three slices share, pixels.
+/// Total width of the three slices on the page, pixels.
 const PAGE_PIXELS: f64 = 900.0;
-/// HU of the histogram, and width of its bins.
+/// Range of the histogram and width of its bins, HU.
 const HISTOGRAM_HU: [i32; 2] = [-1200, 2800];
 const BIN_HU: i32 = 10;
 
-/// The page. It names no person, file or folder, only what [`Info`] and [`Audit`] hold.
+/// Writes the page. It contains no names of persons, files or folders, only the contents of [`Info`] and [`Audit`].
 pub fn audit_page(scan: &Scan, audit: &Audit) -> String {
     let page = html! {
         (DOCTYPE)
@@ -96,7 +96,7 @@ fn facts(info: &Info, scan: &Scan, audit: &Audit) -> Markup {
     }
 }
 
-/// The slices through the middle, seen as radiologists do: from the feet, from the front, from the left.
+/// The slices through the middle in radiological view: from the feet, from the front, from the left.
 fn slices(volume: &Volume) -> Markup {
     let view = LpsView::of(volume);
     let (size, spacing) = (view.size(), view.spacing_mm());
@@ -113,7 +113,7 @@ fn slices(volume: &Volume) -> Markup {
     }
 }
 
-/// A slice with the letters at its left, right, top and bottom.
+/// A slice with the orientation letters at its left, right, top and bottom.
 fn figure(
     name: &str,
     [across, down]: [usize; 2],
@@ -130,7 +130,7 @@ fn figure(
     let source = data_uri(&picture)
         .expect("a grid has voxels along every axis, and memory takes every byte");
     let mm = [0, 1, 2].map(|axis| size[axis] as f64 * spacing_mm[axis]);
-    // Two slices are as wide as the body, one as deep: all three at one scale.
+    // Two slices are as wide as the body, one as deep: all three have the same scale.
     let scale = (PAGE_PIXELS / (2.0 * mm[0] + mm[1])).min(PIXELS_PER_MM);
     let [w_mm, h_mm] = [across, down].map(|axis| mm[axis]);
     let [w, h] = [w_mm, h_mm].map(|mm| format!("{:.0}", mm * scale));
@@ -208,7 +208,7 @@ mod tests {
             -1200.4, -1200.6, -0.4, 9.4, 9.6, 2789.0, 2800.0,
         ]));
         assert_eq!(counts.len(), 400);
-        // -1200.6 rounds to -1201, which lies below the range, and 9.6 to 10.
+        // -1200.6 rounds to -1201, which is below the range, and 9.6 to 10.
         assert_eq!(
             [counts[0], counts[120], counts[121], counts[398]],
             [1, 2, 1, 1]

@@ -1,4 +1,4 @@
-//! One picture of a dataset: depth images in false colour and radiographs, a column per pose.
+//! Overview picture of a dataset: depth images in false colour and radiographs, one column per pose.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ use crate::drawing::write_text;
 const TILE: u32 = 208;
 const GAP: u32 = 6;
 const CAPTION: u32 = 22;
-/// Left of the rows: ten letters of 16 pixels, with a gap on both sides.
+/// Width to the left of the rows: ten letters of 16 pixels, with a gap on both sides.
 const MARGIN: u32 = 172;
 /// Height of the colour scale below the rows, and length of its bar.
 const SCALE: [u32; 2] = [28, 420];
@@ -31,10 +31,10 @@ pub enum ContactSheetError {
     /// A file of the dataset cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The folder of a dataset that is being made.
+    /// The folder of an unfinished dataset.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The dataset shows no poses of this limb.
+    /// The dataset has no poses of this limb.
     #[error("{} contains no depth images of {limb}", root.display())]
     Empty {
         /// The dataset.
@@ -44,15 +44,15 @@ pub enum ContactSheetError {
     },
 }
 
-/// Draws up to `columns` poses of one limb, evenly chosen: each body shape and camera once per
-/// row, the radiographs below.
+/// Draws up to `columns` evenly spaced poses of one limb: one row for each camera with the original shape and one for each further
+/// shape, with the radiographs below.
 ///
-/// Depth images are cropped to their region of interest and share one colour scale: the 1st to
-/// the 99th percentile of all depths shown, near red, far blue, invalid black; it stands below in mm. A cross stands for an image that cannot be read
-/// or has no region of interest.
+/// Depth images are cropped to their region of interest and share one colour scale: the 1st to the 99th percentile of all depths
+/// shown, near red, far blue, invalid black; the scale is drawn below in mm. A cross marks an image that cannot be read or has no
+/// region of interest.
 ///
 /// # Errors
-/// [`ContactSheetError`] when a list is missing or unreadable, or shows nothing of the limb.
+/// [`ContactSheetError`] when a list is missing or unreadable, or contains nothing of the limb.
 pub fn contact_sheet(
     root: &Path,
     limb: LimbId,
@@ -61,10 +61,10 @@ pub fn contact_sheet(
     Ok(draw(&tiles(root, limb, columns)?))
 }
 
-/// The contact sheet of the poses that are made so far, while `generate` makes the others.
+/// Draws the contact sheet of the finished poses while `generate` makes the others.
 ///
 /// # Errors
-/// [`ContactSheetError`] when `root` holds no dataset, or no pose of the limb is made.
+/// [`ContactSheetError`] when `root` contains no dataset, or no pose of the limb is finished.
 pub fn growing_contact_sheet(
     root: &Path,
     limb: LimbId,
@@ -75,7 +75,7 @@ pub fn growing_contact_sheet(
     Ok(draw(&tiles))
 }
 
-/// Evenly chosen poses of one limb as rows of small pictures.
+/// Evenly spaced poses of one limb as rows of small pictures.
 pub(crate) struct Tiles {
     /// Half degrees of rotation, one per column.
     pub steps: Vec<u32>,
@@ -85,7 +85,7 @@ pub(crate) struct Tiles {
     pub rows: Vec<(String, Vec<RgbImage>)>,
 }
 
-/// What [`contact_sheet`] shows.
+/// The content of [`contact_sheet`].
 pub(crate) fn tiles(root: &Path, limb: LimbId, columns: usize) -> Result<Tiles, ContactSheetError> {
     let manifest = Manifest::read(root)?;
     let rois = manifest.rois(limb)?;
@@ -227,7 +227,7 @@ fn draw(tiles: &Tiles) -> RgbImage {
     sheet
 }
 
-/// The colours of depths from near to far, with both ends in mm.
+/// Draws the colours of depths from near to far, with both ends in mm.
 fn draw_scale(sheet: &mut RgbImage, range_mm: [f64; 2], y: u32) {
     let [near, far] = range_mm.map(|mm| format!("{mm:.0} mm"));
     let letters = |text: &str| 8 * TEXT * text.len() as u32;
@@ -254,7 +254,7 @@ fn coloured(depth: &Gray16, range_mm: [f64; 2]) -> RgbImage {
     })
 }
 
-/// What stands for an image that cannot be read.
+/// Replaces an image that cannot be read.
 fn cross() -> RgbImage {
     let on_diagonal = |x: u32, y: u32| x.abs_diff(y) < 2 || (x + y).abs_diff(TILE - 1) < 2;
     RgbImage::from_fn(TILE, TILE, |x, y| {
@@ -266,7 +266,7 @@ fn cross() -> RgbImage {
     })
 }
 
-/// A grey image scaled into a tile, its shape kept.
+/// A grey image scaled to fit a tile, with its aspect ratio kept.
 fn fit(image: &Gray16) -> RgbImage {
     let scale = f64::from(TILE) / f64::from(image.width().max(image.height()));
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).clamp(1, TILE);

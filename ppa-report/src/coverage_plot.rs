@@ -7,12 +7,12 @@ use ppa_depth::{Coverage, Viewpoint};
 
 use crate::chart::pixels::{FONT, Pixels, SCALE, picture};
 
-/// A camera's place seen from the joint, and what it sees from there.
+/// A camera position relative to the joint, and what the camera sees from there.
 #[derive(Debug, Clone, Copy)]
 pub struct RankedView {
-    /// Where it stands.
+    /// Position of the camera.
     pub viewpoint: Viewpoint,
-    /// What it sees.
+    /// Visible part of the joint.
     pub coverage: Coverage,
 }
 
@@ -21,18 +21,18 @@ const SIZE: [u32; 2] = [1160, 600];
 const BACKGROUND: RGBColor = RGBColor(24, 24, 24);
 const INK: RGBColor = RGBColor(235, 235, 235);
 const FAINT: RGBColor = RGBColor(90, 90, 90);
-/// Places that are numbered, from the best.
+/// Number of best places that are numbered.
 const NUMBERED: usize = 5;
 /// Radius of the smallest disc, pixels.
 const DOT: i32 = 5;
-/// By which the disc of each further distance is larger, pixels.
+/// Increase of the disc radius per further distance, pixels.
 const RING: i32 = 4;
 
 type Page<'a> = DrawingArea<Pixels<'a>, Shift>;
 type Drawn<'a> = Result<(), DrawingAreaErrorKind<<Pixels<'a> as DrawingBackend>::ErrorType>>;
 
-/// Draws views, the best first: on the left the sky above the joint, straight above in the middle, with a disc per camera, larger
-/// for larger distances and below the nearer ones; on the right share of the surface over mm per pixel. Colours show the share.
+/// Draws views, the best first. Left: the sky above the joint, straight above in the middle, with a disc per camera that is larger
+/// for larger distances and drawn below the nearer ones. Right: share of the surface against mm per pixel. Colours show the share.
 pub fn coverage_plot(views: &[RankedView]) -> RgbImage {
     picture(SIZE, |page| {
         page.fill(&BACKGROUND)?;
@@ -58,7 +58,7 @@ fn colour(view: &RankedView, largest_share: f64) -> ShapeStyle {
     RGBColor(r, g, b).filled()
 }
 
-/// Where a camera stands in the sky, degrees from straight above: to the right along x, up along y.
+/// Direction of a camera in the sky, degrees from straight above: to the right along x, up along y.
 fn direction(viewpoint: &Viewpoint) -> (f64, f64) {
     let away = 90.0 - viewpoint.elevation_deg;
     let (sin, cos) = viewpoint.azimuth_deg.to_radians().sin_cos();
@@ -86,7 +86,7 @@ fn draw_sky<'a>(page: &Page<'a>, views: &[RankedView]) -> Drawn<'a> {
     let mut distances: Vec<f64> = views.iter().map(rounded).collect();
     distances.sort_by(f64::total_cmp);
     distances.dedup();
-    // More than a few distances are places from a file, which need no rings.
+    // More than a few distances come from places in a file, which need no rings.
     let has_rings = distances.len() <= 6;
     let size = |view: &RankedView| {
         let nth = distances.iter().position(|d| *d == rounded(view));
@@ -160,8 +160,8 @@ fn draw_shares<'a>(page: &Page<'a>, views: &[RankedView]) -> Drawn<'a> {
     })
 }
 
-/// Circles and numbers the best; numbers of one place stand side by side. `place` gives a place on the canvas, and the radius
-/// of its disc.
+/// Circles and numbers the best views; numbers of the same place are written side by side. `place` returns a position on the canvas
+/// and the radius of its disc.
 fn number<'a>(
     page: &Page<'a>,
     views: &[RankedView],
@@ -189,7 +189,7 @@ fn number<'a>(
 mod tests {
     use super::*;
 
-    /// A camera at x lies to the right of the middle, one at y above it; more of the surface is brighter.
+    /// A camera at x is to the right of the middle, one at y above it; a larger share of the surface is brighter.
     #[test]
     fn places_and_colours_are_those_of_the_views() {
         let view = |azimuth_deg, visible_share| RankedView {
@@ -207,7 +207,7 @@ mod tests {
             },
         };
         let sheet = coverage_plot(&[view(0.0, 0.4), view(90.0, 0.1)]);
-        // The sky's panel has sides of 460 pixels, its rim is at 94.5 degrees.
+        // The panel of the sky has sides of 460 pixels; its rim is at 94.5 degrees.
         let away = 60.0 / 94.5 * 230.0;
         let at = |x: f64, y: f64| sheet.get_pixel(x as u32, y as u32).0;
         let (right, top) = (at(290.0 + away, 300.0), at(290.0, 300.0 - away));

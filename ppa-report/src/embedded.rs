@@ -1,4 +1,4 @@
-//! Pictures inside a page of HTML.
+//! Pictures embedded in HTML pages.
 
 use std::io::Cursor;
 
@@ -6,7 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::{EncodableLayout, ImageBuffer, ImageFormat, ImageResult, PixelWithColorType};
 
-/// A picture as the address of an `img` element, which holds all of it.
+/// A picture as a data URI for the `src` of an `img` element.
 pub(crate) fn data_uri<P>(picture: &ImageBuffer<P, Vec<P::Subpixel>>) -> ImageResult<String>
 where
     P: PixelWithColorType,

@@ -1,4 +1,4 @@
-//! Charts of a training and of an evaluation of its network.
+//! Charts of a training run and of an evaluation of its network.
 
 use crate::chart::{Chart, Mark, Series, Tile};
 
@@ -16,7 +16,7 @@ fn chart(title: &str, labels: [&str; 2], ranges: [[f64; 2]; 2], series: Vec<Seri
     }
 }
 
-/// From 0 to a tenth above the greatest value; to 1 where there is none.
+/// Range from 0 to a tenth above the largest value; to 1 if no value is positive.
 fn from_zero(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let greatest = values.fold(0.0, f64::max);
     [0.0, if greatest > 0.0 { 1.1 * greatest } else { 1.0 }]
@@ -33,8 +33,8 @@ pub fn predictions_by_label(points: Vec<[f64; 2]>) -> Chart {
     chart("Predictions against labels", labels, [QUALITY; 2], series)
 }
 
-/// How many images of each class of the label (row) were put into which class (column), of N classes from 1 to 3; tinted by
-/// their share of the class.
+/// Number of images of each class of the label (row) that were assigned to each class (column), of N classes from 1 to 3; tinted by
+/// their share of the label's class.
 pub fn confusion<const N: usize>(table: &[[usize; N]; N]) -> Chart {
     let half = 1.0 / (N - 1) as f64;
     let ends = |class: usize| {
@@ -62,7 +62,7 @@ pub fn confusion<const N: usize>(table: &[[usize; N]; N]) -> Chart {
     }
 }
 
-/// Mean predictions against mean labels: of the images of each label, and of images that are predicted alike.
+/// Mean predictions against mean labels: for the images of each label, and for images with similar predictions.
 pub fn calibration(by_label: Vec<[f64; 2]>, by_prediction: Vec<[f64; 2]>) -> Chart {
     let series = vec![
         Series::new("by label", Mark::DotsAndLine, by_label),
@@ -98,7 +98,7 @@ fn errors_along(title: &str, along: &str, series: Vec<(String, Vec<[f64; 2]>)>) 
     chart(title, labels, ranges, series)
 }
 
-/// Loss of training and errors of evaluation against steps.
+/// Loss in training and errors in evaluation against steps.
 pub fn learning_curve(
     training_mse: Vec<[f64; 2]>,
     evaluation_mse: Vec<[f64; 2]>,
@@ -110,7 +110,7 @@ pub fn learning_curve(
         Series::new("evaluation MAE", Mark::DotsAndLine, evaluation_mae),
     ];
     let of = |axis: usize| curves.iter().flat_map(|c| &c.points).map(move |p| p[axis]);
-    // The first losses would squeeze all others: the axis ends at five times the median.
+    // Large first losses would compress all others: the axis ends at five times the median.
     let mut errors: Vec<f64> = of(1).collect();
     errors.sort_by(f64::total_cmp);
     let bound = 5.0 * errors.get(errors.len() / 2).copied().unwrap_or(1.0);
@@ -125,7 +125,7 @@ pub fn learning_curve(
 mod tests {
     use super::*;
 
-    /// One loss of 100 among hundreds of 1 does not decide the axis.
+    /// One loss of 100 among hundreds of 1 does not determine the axis.
     #[test]
     fn the_first_losses_do_not_squeeze_the_curve() {
         let losses = (0..9).map(|step| [f64::from(step), if step == 0 { 100.0 } else { 1.0 }]);
@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(chart.series.len(), 2);
     }
 
-    /// Rows are labels, which lie along the first axis.
+    /// Rows are labels, which are along the first axis.
     #[test]
     fn shares_are_of_the_labels_class() {
         let chart = confusion(&[[1, 3], [0, 0]]);

@@ -1,4 +1,4 @@
-//! The page of the experiments: tables beside the paper's, charts, and the poses with the largest errors.
+//! The page of the experiments: tables with the paper's numbers for comparison, charts, and the poses with the largest errors.
 
 use image::{ImageResult, Rgb, RgbImage};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -8,7 +8,7 @@ use ppa_depth::false_colour;
 use crate::chart::Chart;
 use crate::embedded::data_uri;
 
-/// Width of a picture of the page, pixels.
+/// Width of a picture on the page, pixels.
 const PICTURE: u32 = 192;
 
 /// One experiment on the page.
@@ -18,15 +18,15 @@ pub struct ExperimentPart {
     pub title: String,
     /// Its verdicts and tests in sentences.
     pub findings: Vec<String>,
-    /// What is missing or failed.
+    /// Missing or failed parts.
     pub failures: Vec<String>,
     /// Headings of the table's columns.
     pub headings: Vec<String>,
     /// Name and cells of the table's rows.
     pub rows: Vec<(String, Vec<ResultCell>)>,
-    /// How the table is to be read.
+    /// Notes on how to read the table.
     pub notes: Vec<String>,
-    /// Charts, and what they show.
+    /// Captions and charts.
     pub charts: Vec<(String, Chart)>,
     /// Poses with the largest errors.
     pub worst: Vec<WorstPose>,
@@ -43,16 +43,16 @@ pub struct ResultCell {
     pub published: Option<String>,
 }
 
-/// A pose and how wrong its prediction is.
+/// A pose with its prediction and images.
 #[derive(Debug, Clone)]
 pub struct WorstPose {
     /// Person, pose, label and prediction.
     pub caption: String,
-    /// What the networks saw: depths in mm, 0 where invalid.
+    /// Input of the networks: depths in mm, 0 if invalid.
     pub images: Vec<GrayImage16>,
 }
 
-/// Experiments as one page of HTML without any address outside of it.
+/// Writes the experiments as one HTML page without external addresses.
 ///
 /// # Errors
 /// [`image::ImageError`] if a picture cannot be encoded.
@@ -139,7 +139,7 @@ fn table(part: &ExperimentPart) -> Markup {
     }
 }
 
-/// A depth image in false colour between its nearest and its farthest valid pixel.
+/// A depth image in false colour from its nearest to its farthest valid pixel.
 fn picture(image: &GrayImage16) -> RgbImage {
     let valid = image
         .pixels

@@ -1,7 +1,8 @@
 //! Pictures and pages for inspecting cases, poses and datasets.
 //!
-//! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture ([`growing_contact_sheet`] while it is made), [`qa_page`] the quality report
-//! of a dataset and [`pose_rows`] what it draws, [`coverage_plot`] where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation,
+//! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] shows a dataset in one picture
+//! ([`growing_contact_sheet`] while it is made), [`qa_page`] is the quality report of a dataset and [`pose_rows`] its data,
+//! [`coverage_plot`] shows where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation,
 //! [`experiments_page`] shows the paper's experiments.
 
 mod audit_page;

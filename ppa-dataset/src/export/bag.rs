@@ -1,4 +1,4 @@
-//! BagIt (RFC 8493): a copy of a dataset with the hash of every file, as archives and journals accept it.
+//! BagIt (RFC 8493): a copy of a dataset with the hash of every file, a format that archives and journals accept.
 
 use std::collections::HashMap;
 use std::fs::{self, File};
@@ -18,7 +18,7 @@ use crate::whole_folder::write_whole_folder;
 const MANIFEST: &str = "manifest-sha256.txt";
 const DECLARATION: &str = "BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n";
 
-/// What a bag holds.
+/// Size of a bag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Bag {
     /// Files of the dataset.
@@ -27,7 +27,7 @@ pub struct Bag {
     pub bytes: u64,
 }
 
-/// Why a dataset cannot be bagged; nothing is left behind then.
+/// Why a dataset cannot be bagged; nothing is left behind in that case.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BagError {
@@ -37,13 +37,13 @@ pub enum BagError {
     /// A folder that is not a dataset.
     #[error(transparent)]
     Published(#[from] PublishedError),
-    /// `ppa generate` began it and did not finish it.
+    /// `ppa generate` did not finish the dataset.
     #[error("{} is not finished: it has no manifest.jsonl; run ppa generate again", .0.display())]
     Unfinished(PathBuf),
     /// A link or device, whose contents are not part of the dataset.
     #[error("{} is neither a file nor a folder, and a bag can hold nothing else", .0.display())]
     Special(PathBuf),
-    /// It was asked to stop.
+    /// The bag was not finished because a stop was requested.
     #[error("the bag was not finished")]
     Stopped(#[from] Stopped),
     /// An image that is not the one in `manifest.jsonl`.
@@ -53,20 +53,20 @@ pub enum BagError {
         path: PathBuf,
         /// Its hash.
         found: String,
-        /// That of its row.
+        /// The hash in its row.
         expected: String,
     },
 }
 
-/// How tables of grades and keys of pictures begin: they never leave with a dataset, for they name readers, or reveal who graded what.
+/// First bytes of tables of grades and keys of pictures. They are never published, because they name readers or reveal who graded what.
 const NOT_TO_BE_BAGGED: [&[u8]; 2] = [b"image,reader,grade", b"name,image,sha256"];
 
-/// Copies the dataset in `root`, of either published layout, into the bag `to`, whole or not at all. Hidden files and folders,
-/// among them the records of `ppa generate`, and tables of readers' grades and keys, by whatever name, are left out. Once `stop` is
-/// true it ends before the next file, and leaves nothing.
+/// Copies the dataset in `root`, of either published layout, into the bag `to`, completely or not at all. Leaves out hidden files and
+/// folders, such as the records of `ppa generate`, and tables of readers' grades and keys under any name. Once `stop` is true, it
+/// ends before the next file and leaves nothing behind.
 ///
 /// # Errors
-/// [`BagError`]; among them images that are not as in `manifest.jsonl`, labels of other radiographs, and links. `to` must not exist or be
+/// [`BagError`], for example for images that differ from `manifest.jsonl`, outdated labels, and links. `to` must not exist or must be
 /// empty.
 pub fn bag(root: &Path, to: &Path, stop: &AtomicBool) -> Result<Bag, BagError> {
     Published::read(root)?;
@@ -120,7 +120,7 @@ fn altered(root: &Path, name: &str, found: &str, expected: String) -> BagError {
     }
 }
 
-/// Hashes of the images in `manifest.jsonl`; none for a dataset that others made.
+/// Hashes of the images in `manifest.jsonl`; empty for a dataset of other authors.
 fn listed(root: &Path) -> Result<HashMap<String, String>, BagError> {
     if !root.join(Manifest::FILE).exists() {
         return if root.join(".ppa").exists() {
@@ -180,7 +180,7 @@ fn names_readers(path: &Path) -> io::Result<bool> {
         .any(|header| start.starts_with(header)))
 }
 
-/// Copies a file; its size and hash as they were read.
+/// Copies a file and returns its size and hash as they were read.
 fn copy(from: &Path, to: &Path) -> Result<(u64, String), FileError> {
     let folder = to.parent().expect("payload lies in the folder data");
     fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
@@ -202,7 +202,7 @@ fn copy(from: &Path, to: &Path) -> Result<(u64, String), FileError> {
     }
 }
 
-/// A path as manifests write it: the characters that end a line, and the percent sign, by their codes.
+/// A path as written in manifests: percent signs and the characters that end a line are percent-encoded.
 fn encoded(name: &str) -> String {
     name.replace('%', "%25")
         .replace('\r', "%0D")

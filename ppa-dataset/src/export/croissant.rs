@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::metadata::{DESCRIPTION, Metadata, PAPER, Provenance, TABLE};
 use super::table::{Column, Table, Values};
 
-/// The dataset's metadata with a record per row of its table.
+/// The dataset's metadata with one record per row of its table.
 pub(super) fn croissant(
     metadata: &Metadata,
     table: &Table,
@@ -53,7 +53,7 @@ pub(super) fn croissant(
 }
 
 fn field(column: &Column) -> Value {
-    // Croissant knows no number that is missing.
+    // Croissant has no missing numbers.
     let of_type = match &column.values {
         Values::Count(values) if values.iter().all(Option::is_some) => "sc:Integer",
         Values::Real(values) if values.iter().all(Option::is_some) => "sc:Float",
@@ -66,7 +66,7 @@ fn field(column: &Column) -> Value {
     })
 }
 
-/// The terms of the specification and where they are defined.
+/// Terms of the specification and their definitions.
 fn context() -> Value {
     let mut context = json!({
         "@language": "en",

@@ -7,7 +7,7 @@ use ppa_core::text::count;
 use super::metadata::{DESCRIPTION, Metadata, PAPER, Provenance};
 use super::table::Table;
 
-/// The text, in Markdown. What only people know stands there as a question.
+/// The datasheet in Markdown. Questions that only people can answer are left open.
 pub(super) fn datasheet(
     metadata: &Metadata,
     table: &Table,
@@ -60,7 +60,7 @@ pub(super) fn datasheet(
     )
 }
 
-/// `12 depth, 3 radiograph`.
+/// Names with their counts, such as `12 depth, 3 radiograph`.
 fn counted<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for name in names {

@@ -1,22 +1,22 @@
-//! Input of a dataset's metadata.
+//! Facts about a dataset that its author has to provide for the metadata.
 
 use std::collections::BTreeSet;
 
 use serde::Deserialize;
 
-/// What no program can know about a dataset.
+/// Facts about a dataset that a program cannot determine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Metadata {
     /// Its name.
     pub name: String,
-    /// Address of its licence, as `https://creativecommons.org/licenses/by/4.0/`.
+    /// URL of its licence, such as `https://creativecommons.org/licenses/by/4.0/`.
     pub license: String,
-    /// Day of publication, as `2026-11-21`.
+    /// Day of publication, such as `2026-11-21`.
     pub date: String,
 }
 
 impl Metadata {
-    /// Whether search engines and archives can use it; says what is wrong.
+    /// Checks that search engines and archives accept the values; the error says what is wrong.
     pub(super) fn check(&self) -> Result<(), String> {
         if self.name.trim().is_empty() {
             return Err("the name is empty".to_owned());
@@ -40,7 +40,7 @@ impl Metadata {
     }
 }
 
-/// Whether a text is a day of the Gregorian calendar as `2026-11-21`.
+/// Whether a text is a day of the Gregorian calendar such as `2026-11-21`.
 fn is_day(text: &str) -> bool {
     let number = |part: &str, digits: usize| -> Option<u32> {
         let plain = part.len() == digits && part.bytes().all(|byte| byte.is_ascii_digit());
@@ -64,7 +64,7 @@ fn is_day(text: &str) -> bool {
     (1..=days).contains(&day)
 }
 
-/// What `dataset.json` says of where the images come from.
+/// Provenance of the images from `dataset.json`.
 #[derive(Deserialize)]
 pub(super) struct Provenance {
     pub settings: Generator,
@@ -96,15 +96,15 @@ impl Provenance {
     }
 }
 
-/// What both formats say of every dataset.
+/// Description of every dataset in both formats.
 pub(super) const DESCRIPTION: &str = "Depth images that two Time-of-Flight cameras on an x-ray device would see of a limb lying \
     on the table, and the radiograph of the same pose, simulated from computed tomography for many rotations of the limb and several body shapes. \
     Depth images: 16-bit PNG, Z in mm, 0 invalid. Radiographs: 16-bit PNG for viewing, EXR with tallies in eV/cm2 per history.";
 
-/// The method.
+/// The paper that describes the method.
 pub(super) const PAPER: &str = "https://doi.org/10.59275/j.melba.2026-c874";
 
-/// Table that the metadata describe.
+/// The table described by the metadata.
 pub(super) const TABLE: &str = "manifest.csv";
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Export for other programs: tables, metadata, archives. All of it is derived and can be regenerated.
+//! Export for other programs: tables, metadata, archives. All of these are derived and can be regenerated.
 
 mod bag;
 mod croissant;

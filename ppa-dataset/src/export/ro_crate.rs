@@ -95,7 +95,7 @@ pub(super) fn ro_crate(
             json!({"@id": file, "@type": "File", "encodingFormat": format, "sha256": sha256}),
         );
     }
-    // RO-Crate's own context does not know the term; readers would drop it.
+    // RO-Crate's own context does not define this term, so readers would drop it.
     let context = json!([
         "https://w3id.org/ro/crate/1.1/context",
         {"sha256": "https://schema.org/sha256"},

@@ -1,4 +1,4 @@
-//! One row per file, with all its metadata.
+//! Table with one row per file and all its metadata.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,17 +13,17 @@ use crate::layout::{LimbId, View};
 use crate::manifest::{FileRow, Manifest};
 use crate::split::{Split, SplitError};
 
-/// Why a dataset has no table.
+/// Why a table cannot be made of a dataset.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// A file of the dataset, or the table's.
+    /// A file of the dataset, or the table itself.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Labels of a limb.
+    /// The labels of a limb.
     #[error(transparent)]
     Labels(#[from] LabelFileError),
-    /// Labels of radiographs that were made again since.
+    /// Labels of radiographs that have since been replaced.
     #[error("{}: the label of step {step} is for a radiograph that has since been replaced; label the radiographs again", path.display())]
     Outdated {
         /// `labels.json` of the limb.
@@ -31,13 +31,13 @@ pub enum TableError {
         /// Half degrees of rotation.
         step: u32,
     },
-    /// A file that is there, and not as it would be written.
+    /// An existing file that differs from what would be written.
     #[error("{} exists and differs from what would be written: give --replace to replace it", .0.display())]
     Differs(PathBuf),
-    /// Name, licence or date.
+    /// An invalid name, licence or date.
     #[error("{0}")]
     Metadata(String),
-    /// The split that was asked for.
+    /// The requested split.
     #[error(transparent)]
     Split(#[from] SplitError),
 }
@@ -59,7 +59,7 @@ pub enum TableError {
 /// | `split` | part of the split that the person is in |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// In a fixed order.
+    /// The columns, in a fixed order.
     pub columns: Vec<Column>,
     limbs: Vec<LimbId>,
 }
@@ -69,11 +69,11 @@ pub struct Table {
 pub struct Column {
     /// Its name.
     pub name: &'static str,
-    /// A value per file.
+    /// One value per file.
     pub values: Values,
 }
 
-/// Values of a column; `None` where a file has none.
+/// Values of a column; `None` for files without a value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// Text.
@@ -108,7 +108,7 @@ impl Values {
     }
 }
 
-/// What the rows of a manifest share, from `dataset.json`.
+/// The part of `dataset.json` that applies to all rows of a manifest.
 #[derive(Deserialize)]
 struct Shared {
     settings: Settings,
@@ -123,7 +123,7 @@ struct Settings {
 #[derive(Deserialize)]
 struct Xray {
     engine: Engine,
-    /// The analog engine, where it was used in place of the other.
+    /// The analog engine, if it was used instead of the other one.
     analog: Option<Analog>,
 }
 
@@ -133,7 +133,7 @@ struct Analog {
 }
 
 impl Xray {
-    /// Photons whose noise an image carries, infinite for none, and photons that were followed.
+    /// Photons whose noise an image carries (infinite for none), and photons that were followed.
     fn histories(&self) -> (f64, u64) {
         match (&self.analog, &self.engine) {
             (Some(analog), _) => (analog.histories as f64, analog.histories),
@@ -147,7 +147,7 @@ impl Xray {
 
 #[derive(Deserialize)]
 struct Engine {
-    /// JSON knows no infinity, which is an image without noise.
+    /// `None` for an image without noise, since JSON cannot store infinity.
     dose_histories: Option<f64>,
     scatter_histories: u64,
 }
@@ -160,7 +160,7 @@ struct CameraRow {
 }
 
 impl Table {
-    /// The table of the dataset in `root`, which `ppa generate` finished; `split` names one of its splits.
+    /// Builds the table of the finished dataset in `root`; `split` names one of its splits.
     ///
     /// # Errors
     /// [`TableError`] naming the file at fault.
@@ -192,7 +192,7 @@ impl Table {
         Ok(Self { columns, limbs })
     }
 
-    /// The limbs in it, in order.
+    /// The limbs in the table, in order.
     pub(super) fn limbs(&self) -> &[LimbId] {
         &self.limbs
     }
@@ -225,7 +225,7 @@ impl Table {
         self.columns.first().map_or(0, |column| column.values.len())
     }
 
-    /// The table as CSV with a header line; what a file does not have is empty.
+    /// The table as CSV with a header line; missing values are empty.
     pub fn to_csv(&self) -> Vec<u8> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let names = self.columns.iter().map(|column| column.name);
@@ -237,7 +237,7 @@ impl Table {
         writer.into_inner().expect("memory takes all")
     }
 
-    /// Writes it as CSV, or with the feature `parquet` as Parquet, by the extension of `path`; whole or not at all.
+    /// Writes the table as CSV, or with the feature `parquet` as Parquet, by the extension of `path`; completely or not at all.
     ///
     /// # Errors
     /// [`FileError`] for other extensions, or when it cannot be written.
@@ -317,7 +317,7 @@ fn json(value: &impl Serialize) -> Option<String> {
     Some(serde_json::to_string(value).expect("manifests hold only JSON values"))
 }
 
-/// The name of a value of an enumeration, as JSON has it.
+/// The name of an enumeration's value in JSON.
 fn name(value: &impl Serialize) -> Option<String> {
     let value = serde_json::to_value(value).expect("manifests hold only JSON values");
     value.as_str().map(str::to_owned)

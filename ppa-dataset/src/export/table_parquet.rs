@@ -11,7 +11,7 @@ use parquet::schema::parser::parse_message_type;
 use super::table::{Table, Values};
 
 impl Table {
-    /// The table as a Parquet file of one row group; what a file does not have is null. Whole numbers are unsigned.
+    /// The table as a Parquet file of one row group; missing values are null. Whole numbers are unsigned.
     pub fn to_parquet(&self) -> Vec<u8> {
         self.written()
             .expect("memory takes columns of their own types")
@@ -27,7 +27,7 @@ impl Table {
             format!("OPTIONAL {of_type} {}{logical};", column.name)
         });
         let schema = format!("message files {{ {} }}", fields.collect::<String>());
-        // The writer's own name, with its version, would change the bytes with the library.
+        // The default includes the library's version, so the bytes would change with every update.
         let properties = WriterProperties::builder().set_created_by("ppa".to_owned());
         let schema = Arc::new(parse_message_type(&schema)?);
         let mut writer =
@@ -60,7 +60,7 @@ fn write_column(
                 .write_batch(&there, Some(&present(values)), None)?;
         }
         Values::Count(values) => {
-            // Parquet keeps unsigned numbers in the bits of signed ones.
+            // Parquet stores unsigned numbers in the bits of signed ones.
             let there: Vec<_> = values.iter().flatten().map(|count| *count as i64).collect();
             column
                 .typed::<Int64Type>()
@@ -76,7 +76,7 @@ fn write_column(
     column.close()
 }
 
-/// 1 for a value that is there, 0 for null.
+/// Definition levels: 1 for a value, 0 for null.
 fn present<T>(values: &[Option<T>]) -> Vec<i16> {
     values
         .iter()

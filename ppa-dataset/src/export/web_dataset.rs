@@ -28,7 +28,7 @@ pub enum WebDatasetError {
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It was asked to stop.
+    /// Not all archives were written because a stop was requested.
     #[error("not all archives were written")]
     Stopped(#[from] Stopped),
 }
@@ -43,16 +43,16 @@ pub struct Shards {
 }
 
 /// Writes the image pairs of the dataset in `root`, in either layout, as archives of `per_shard` samples each into the folder
-/// `to`, whole or not at all.
+/// `to`, completely or not at all.
 ///
-/// A sample is `NAME.left.png`, `NAME.right.png`, `NAME.xray.png` as far as they are there, and `NAME.json` with person, pose,
-/// regions and label; `NAME` is `patient_0_r_036_orig` or `patient_1_l_min_0_1000`. With a split, each part has archives of its own,
-/// `train-000000.tar`; without one they are `all-000000.tar`. Order, sizes and bytes are always the same.
+/// A sample consists of those of `NAME.left.png`, `NAME.right.png` and `NAME.xray.png` that exist, and `NAME.json` with person,
+/// pose, regions and label; `NAME` is `patient_0_r_036_orig` or `patient_1_l_min_0_1000`. With a split, each part has its own
+/// archives, such as `train-000000.tar`; otherwise they are `all-000000.tar`. Order, sizes and bytes are reproducible.
 ///
-/// Once `stop` is true it ends before the next sample, and leaves nothing.
+/// Once `stop` is true, it ends before the next sample and leaves nothing behind.
 ///
 /// # Errors
-/// [`WebDatasetError`]; `to` must not exist or be empty.
+/// [`WebDatasetError`]; `to` must not exist or must be empty.
 pub fn web_dataset(
     root: &Path,
     to: &Path,
@@ -149,7 +149,7 @@ fn images(pair: &ImagePair) -> impl Iterator<Item = (&'static str, &str)> {
         .filter_map(|(kind, file)| Some((kind, file?)))
 }
 
-/// No dot in it: the name of a sample ends at the first one.
+/// Contains no dot: the name of a sample ends at the first one.
 fn sample_name(pair: &ImagePair) -> String {
     let (patient, side) = (pair.limb.patient, pair.limb.side_letter());
     match pair.pose {

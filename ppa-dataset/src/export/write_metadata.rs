@@ -15,16 +15,16 @@ use crate::split::Split;
 
 const DATASHEET: &str = "datasheet.md";
 
-/// The datasheet where another one is there already, in which people may have answered.
+/// File for the datasheet if a different one exists already, in which people may have answered.
 const NEW_DATASHEET: &str = "datasheet.new.md";
 
 /// Writes `manifest.csv`, `croissant.json` (Croissant 1.1), `ro-crate-metadata.json` (RO-Crate 1.1) and `datasheet.md` into the
-/// dataset in `root`, each whole or not at all; `split` names the split that is listed in the table. An existing datasheet, which people may have
-/// filled in, is kept; one that differs is written next to it as `datasheet.new.md`. Returns the names of the files written.
+/// dataset in `root`, each completely or not at all; `split` names the split listed in the table. Keeps an existing datasheet, which
+/// people may have filled in, and writes a new one that differs as `datasheet.new.md`. Returns the names of the files written.
 ///
 /// # Errors
-/// [`TableError`] naming the file at fault, among them an existing one that differs when `replace` is not set, or the part of the metadata that is
-/// not a valid name, address or date; nothing is written then.
+/// [`TableError`] naming the file at fault, for example an existing one that differs while `replace` is not set, or the invalid name,
+/// address or date in the metadata; nothing is written in that case.
 pub fn write_metadata(
     root: &Path,
     metadata: &Metadata,
@@ -67,7 +67,7 @@ pub fn write_metadata(
     Ok(files.map(|(name, _)| name))
 }
 
-/// Labels of a limb and what they were computed from, by name: `labels*.json`, `openness*.csv` and `openness*.json`.
+/// A limb's labels and the data they were computed from, by name: `labels*.json`, `openness*.csv` and `openness*.json`.
 fn labels(root: &Path, folder: &str) -> Result<Vec<(String, &'static str)>, FileError> {
     let path = root.join(folder);
     let entries = match std::fs::read_dir(&path) {
@@ -89,7 +89,7 @@ fn labels(root: &Path, folder: &str) -> Result<Vec<(String, &'static str)>, File
     Ok(found)
 }
 
-/// Files beside the images, with their formats: labels, regions of interest, splits. Those that are not there are left out.
+/// Files other than the images, with their formats: labels, regions of interest, splits. Missing ones are left out.
 fn lists(root: &Path, table: &Table) -> Result<Vec<(String, &'static str)>, TableError> {
     let mut lists = Vec::new();
     for limb in table.limbs() {

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 /// Bones of a case: NIfTI, NRRD or MetaImage with a whole number per voxel, 0 for none, in the `ct` frame of the scan; its
-/// lattice may be another one.
+/// lattice may differ from that of the scan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoneFile {
     /// The file; a relative path is resolved against the folder of the case file.
     pub path: PathBuf,
-    /// Which number is which bone.
+    /// Number of each bone.
     #[serde(default)]
     pub numbers: BoneNumbers,
     /// Whether `ppa prepare --segment-bones` segmented the scan; otherwise another program or a person did.
@@ -19,7 +19,7 @@ pub struct BoneFile {
     pub segmented: bool,
 }
 
-/// Which label stands for which bone; the defaults are those of `ppa ct phantom --labels`.
+/// Label of each bone; the defaults are those of `ppa ct phantom --labels`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BoneNumbers {

@@ -17,10 +17,10 @@ use crate::manifest::{FileKind, Manifest};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LabelFileError {
-    /// It cannot be read or written.
+    /// The file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It is not a file of labels.
+    /// The file is not a valid label file.
     #[error("{} is not a valid label file: {message}", path.display())]
     Parse {
         /// The file.
@@ -32,15 +32,15 @@ pub enum LabelFileError {
 
 /// The labels of one limb's radiographs.
 ///
-/// A radiograph has one label: that of readers where there is one, else a computed one. All computed labels are also kept in a file of their own,
-/// [`LabelFile::computed_path`].
+/// A radiograph has one label: that of readers if there is one, otherwise a computed one. All computed labels are also kept in a
+/// file of their own, [`LabelFile::computed_path`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LabelFile {
-    /// By name of the radiograph, `xray_image_STEP.png`.
+    /// By file name of the radiograph, `xray_image_STEP.png`.
     rows: BTreeMap<String, Labelled>,
 }
 
-/// A label, who made it, and which bytes its radiograph had, as far as that is known.
+/// A label, its source, and the hash of its radiograph, as far as they are known.
 #[derive(Debug, Clone, PartialEq)]
 struct Labelled {
     row: LabelRow,
@@ -49,7 +49,7 @@ struct Labelled {
 }
 
 impl LabelFile {
-    /// Its path, next to the regions of interest.
+    /// Path of `labels.json`, next to the regions of interest.
     pub fn path(root: &Path, limb: LimbId) -> PathBuf {
         root.join(limb.roi_file()).with_file_name("labels.json")
     }
@@ -60,19 +60,19 @@ impl LabelFile {
             .with_file_name("labels.computed.json")
     }
 
-    /// Path of the labels of a name, next to [`LabelFile::path`]; without a name, that path itself.
+    /// Path of the labels with a given name, next to [`LabelFile::path`]; that path itself if there is no name.
     pub fn named_path(root: &Path, limb: LimbId, name: Option<&LabelName>) -> PathBuf {
         Self::path(root, limb).with_file_name(Self::file_name(name))
     }
 
-    /// Name of the file of the labels of a name, `labels.json` without one.
+    /// File name of the labels with a given name; `labels.json` if there is none.
     pub fn file_name(name: Option<&LabelName>) -> String {
         name.map_or("labels.json".to_owned(), |name| {
             format!("labels.{name}.json")
         })
     }
 
-    /// Labels of one source, in any order.
+    /// Builds a file of labels of one source, given in any order.
     ///
     /// # Errors
     /// [`LabelError`] for labels outside 1 to 3, spreads outside 0 to 1, and steps beyond 360.
@@ -83,7 +83,7 @@ impl LabelFile {
         Self::with_sources(labels.into_iter().map(|row| (row, Some(source))))
     }
 
-    /// Labels with their sources, in any order.
+    /// Builds a file of labels with their sources, given in any order.
     pub(crate) fn with_sources(
         labels: impl IntoIterator<Item = (LabelRow, Option<LabelSource>)>,
     ) -> Result<Self, LabelError> {
@@ -102,7 +102,7 @@ impl LabelFile {
         })
     }
 
-    /// Who made the label of a step; `None` where there is none, or where the file does not name it, as the published ones.
+    /// Source of the label of a step; `None` if there is no label, or if the file does not state its source, as in the published ones.
     pub fn source_of_step(&self, step: u32) -> Option<LabelSource> {
         self.rows.get(&radiograph_name(step))?.source
     }
@@ -120,7 +120,7 @@ impl LabelFile {
         Some(&labelled.row)
     }
 
-    /// The same labels, bound to the radiographs as the manifest lists them now.
+    /// The same labels, with the hashes of their radiographs in the manifest.
     #[must_use]
     pub fn of_radiographs(mut self, manifest: &Manifest, limb: LimbId) -> Self {
         let hashes = radiograph_hashes(manifest, limb);
@@ -131,12 +131,12 @@ impl LabelFile {
         self
     }
 
-    /// The computed labels in it.
+    /// Returns only the computed labels.
     pub fn computed(&self) -> Self {
         self.only(|source| source.is_some_and(LabelSource::is_computed))
     }
 
-    /// The labels in it that are not computed: readers', and those without a source.
+    /// Returns the other labels: readers', and those without a source.
     pub fn not_computed(&self) -> Self {
         self.only(|source| !source.is_some_and(LabelSource::is_computed))
     }
@@ -151,7 +151,7 @@ impl LabelFile {
         }
     }
 
-    /// These labels, and those of `others` for radiographs that have none here.
+    /// These labels, and those of `others` for radiographs without a label here.
     pub fn over(self, others: &Self) -> Self {
         let mut rows = others.rows.clone();
         rows.extend(self.rows);
@@ -163,13 +163,13 @@ impl LabelFile {
         self.rows.values().any(|labelled| labelled.source.is_none())
     }
 
-    /// Whether any label knows which bytes its radiograph had.
+    /// Whether any label has the hash of its radiograph.
     pub fn is_bound(&self) -> bool {
         self.rows.values().any(|labelled| labelled.sha256.is_some())
     }
 
-    /// Steps whose radiograph is no longer the one that was labelled, lowest first. Labels that are bound to no bytes, as the
-    /// published ones, are never among them.
+    /// Steps whose radiograph is no longer the one that was labelled, lowest first. Labels without a hash, such as the published
+    /// ones, are never outdated.
     pub fn outdated(&self, manifest: &Manifest, limb: LimbId) -> Vec<u32> {
         let hashes = radiograph_hashes(manifest, limb);
         let other = |labelled: &&Labelled| {
@@ -186,7 +186,7 @@ impl LabelFile {
     ///
     /// # Errors
     /// [`LabelFileError`] naming the file and the radiograph at fault: labels outside 1 to 3, angles off the grid of half
-    /// degrees from 0 to 180, a radiograph twice, labels of sources that do not go together.
+    /// degrees from 0 to 180, a radiograph listed twice, labels of incompatible sources.
     pub fn read(root: &Path, limb: LimbId) -> Result<Option<Self>, LabelFileError> {
         Self::read_file(Self::path(root, limb))
     }
@@ -196,10 +196,10 @@ impl LabelFile {
         Self::read_file(Self::computed_path(root, limb))
     }
 
-    /// Reads the labels of a name, `labels.json` without one; `None` if there is no file of them.
+    /// Reads the labels with a given name, `labels.json` if there is none; `None` if their file does not exist.
     ///
     /// # Errors
-    /// As [`LabelFile::read`].
+    /// The same as [`LabelFile::read`].
     pub fn read_named(
         root: &Path,
         limb: LimbId,
@@ -219,7 +219,7 @@ impl LabelFile {
         })
     }
 
-    /// Writes `labels.json` of a limb, whole or not at all.
+    /// Writes `labels.json` of a limb, completely or not at all.
     ///
     /// # Errors
     /// [`FileError`] when it cannot be written.
@@ -244,12 +244,12 @@ fn radiograph_hashes(manifest: &Manifest, limb: LimbId) -> HashMap<u32, &str> {
         .collect()
 }
 
-/// A label as written in the file.
+/// A label as stored in the file.
 #[derive(Serialize, Deserialize)]
 struct Entry {
     #[serde(flatten)]
     row: LabelRow,
-    /// Who gave the label; left out where the file does not say.
+    /// Source of the label; left out if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     label_source: Option<LabelSource>,
     /// SHA-256 of the radiograph that was labelled.
@@ -275,7 +275,7 @@ impl<'de> Deserialize<'de> for LabelFile {
     }
 }
 
-/// Reads row by row, since a map would keep the last of two rows of one name.
+/// Reads row by row, since a map would keep only the last of two rows with the same name.
 struct Rows;
 
 impl<'de> Visitor<'de> for Rows {

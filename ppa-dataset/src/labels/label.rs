@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Who says how good a pose is.
+/// Source of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LabelSource {
     /// People who looked at the radiograph.
@@ -14,7 +14,7 @@ pub enum LabelSource {
     /// The same from bones that `ppa prepare --segment-bones` separated in the scan.
     #[serde(rename = "surrogate-jso/1-segmented")]
     SegmentedStrict,
-    /// How far malleoli hide the gutters, graded scale: a surrogate that no reader has confirmed.
+    /// How far the malleoli hide the gutters, graded scale: a surrogate that no reader has confirmed.
     #[serde(rename = "surrogate-jso/2")]
     Graded,
     /// The same from bones that `ppa prepare --segment-bones` separated in the scan.
@@ -40,12 +40,12 @@ impl LabelSource {
     }
 }
 
-/// The sources of the labels in one file: readers beside one kind of computed labels, or none that is named.
+/// The sources of the labels in one file: readers and at most one kind of computed labels, or only unknown sources.
 #[derive(Debug, Default)]
 pub(crate) struct Sources(Vec<Option<LabelSource>>);
 
 impl Sources {
-    /// Takes the source of another label, or says in words beside which one it may not stand.
+    /// Adds the source of another label; the error is the name of a source in this file that it is incompatible with.
     pub fn take(&mut self, source: Option<LabelSource>) -> Result<(), &'static str> {
         let beside = |other: &&Option<LabelSource>| match (source, **other) {
             (Some(a), Some(b)) => a == b || (a.is_computed() != b.is_computed()),
@@ -61,7 +61,7 @@ impl Sources {
     }
 }
 
-/// A source in words.
+/// The name of a source in words.
 pub(crate) fn name_of(source: Option<LabelSource>) -> &'static str {
     source.map_or("an unnamed source", LabelSource::name)
 }
@@ -78,7 +78,7 @@ pub struct LabelRow {
 }
 
 impl LabelRow {
-    /// Mean and standard deviation (ddof 0) of grades; `None` without any.
+    /// Mean and standard deviation (ddof 0) of grades; `None` if there are none.
     pub fn of_grades(grades: &[f64], step: u32) -> Option<Self> {
         let n = grades.len() as f64;
         let label = grades.iter().sum::<f64>() / n;
@@ -95,7 +95,7 @@ impl LabelRow {
         if !(1.0..=3.0).contains(&self.label) {
             return Err(LabelError::Label(at(), self.label));
         }
-        // Grades from 1 to 3 spread by at most 1.
+        // The standard deviation of grades from 1 to 3 is at most 1.
         if !(0.0..=1.0).contains(&self.std) {
             return Err(LabelError::Std(at(), self.std));
         }
@@ -110,7 +110,7 @@ impl LabelRow {
     }
 }
 
-/// The last step that a sweep can have: 180 degrees.
+/// The last possible step of a sweep: 180 degrees.
 const LAST_STEP: u32 = 360;
 
 /// The name of a radiograph, the key of `labels.json`.
@@ -118,7 +118,7 @@ pub(super) fn radiograph_name(step: u32) -> String {
     format!("xray_image_{step}.png")
 }
 
-/// Why a label is none.
+/// Why a label is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LabelError {
@@ -134,7 +134,7 @@ pub enum LabelError {
     /// Beyond the rotations of the layout.
     #[error("{0} is at {1} degrees, expected a multiple of 0.5 from 0 to 180")]
     Angle(String, f64),
-    /// Labels of sources that do not go together.
+    /// Labels of incompatible sources.
     #[error(
         "{image} is labelled by {found}, others by {expected}; a file can hold labels of readers and computed labels of one kind only"
     )]
@@ -143,7 +143,7 @@ pub enum LabelError {
         image: String,
         /// Its source.
         found: &'static str,
-        /// That of an earlier one.
+        /// The source of an earlier one.
         expected: &'static str,
     },
 }
@@ -152,7 +152,7 @@ pub enum LabelError {
 mod tests {
     use super::*;
 
-    /// Four readers and half steps: the only grades that give the published 1.5 and 0.35355, ddof 0.
+    /// Grades of four readers in half steps: the only ones that give the published 1.5 and 0.35355, ddof 0.
     #[test]
     fn mean_and_spread_are_those_published() {
         let row = LabelRow::of_grades(&[1.0, 1.5, 1.5, 2.0], 36).unwrap();

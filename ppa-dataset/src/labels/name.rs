@@ -1,16 +1,16 @@
-//! Names of label sets that a dataset keeps beside `labels.json`.
+//! Names of label sets that a dataset stores in addition to `labels.json`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// Name of the labels in `labels.NAME.json`: 1 to 40 small letters, digits and hyphens, the first one a letter.
+/// Name of the labels in `labels.NAME.json`: 1 to 40 lowercase letters, digits and hyphens, beginning with a letter.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LabelName(String);
 
-/// A text that cannot name labels.
+/// A text that is not a valid name for labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{0:?} is not a valid name for labels: expected 1 to 40 lowercase letters, digits and hyphens, beginning with a letter"
@@ -20,7 +20,7 @@ pub struct LabelNameError(String);
 const MOST_LETTERS: usize = 40;
 
 impl LabelName {
-    /// Its letters.
+    /// The name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }

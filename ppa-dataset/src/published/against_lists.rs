@@ -13,7 +13,7 @@ use crate::checksums::{Checksums, FoundChecksums};
 use crate::files::{FileError, read_text, sha256_of_file};
 use crate::manifest::{FileKind, FileRow, Manifest};
 
-/// Everything in which they differ; nothing where there are none. `hashes` are those of the images.
+/// All differences between the images and the lists, if there are lists. `hashes` are those of the images.
 pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>) -> Vec<Flaw> {
     let root = &dataset.root;
     let mut flaws = same_scans(root);
@@ -46,7 +46,7 @@ pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>)
     flaws
 }
 
-/// What differs from a file of hashes, where there is one; `flaw` is that of a file with another hash.
+/// Differences from a file of hashes, if there is one; `flaw` makes the flaw of a file with another hash.
 fn against_checksums(root: &Path, sums: &'static str, flaw: impl Fn(String) -> Flaw) -> Vec<Flaw> {
     match Checksums::look_at(root, sums) {
         Err(error) => vec![Flaw::Manifest(error_chain(&error))],
@@ -102,7 +102,7 @@ fn against_manifest<'a>(
     flaws
 }
 
-/// What `dataset.json` states of scans.
+/// The part of `dataset.json` that names scans.
 #[derive(Deserialize)]
 struct Scans {
     #[serde(default)]
@@ -115,7 +115,7 @@ struct Scan {
     volume_sha256: String,
 }
 
-/// Scans that stand under two patients.
+/// Scans listed for two patients.
 fn same_scans(root: &Path) -> Vec<Flaw> {
     let path = root.join("dataset.json");
     if !path.exists() {
@@ -142,7 +142,7 @@ fn same_scans(root: &Path) -> Vec<Flaw> {
     flaws
 }
 
-/// `croissant.json` that describes another table: programs that load it would refuse to.
+/// A flaw if `croissant.json` describes another table: programs would refuse to load it.
 fn stale_metadata(root: &Path) -> Option<Flaw> {
     let [metadata, table] = ["croissant.json", "manifest.csv"].map(|name| root.join(name));
     if !metadata.exists() {

@@ -1,4 +1,4 @@
-//! From one published layout to the other.
+//! Conversion from one published layout to the other.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,7 +23,7 @@ pub enum ConvertError {
     /// A file of either dataset.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A label that the other layout does not know, among them of poses whose number is not a step.
+    /// A label that the other layout cannot hold, for example of a pose whose number is not a step.
     #[error("limb {side} of patient {patient}")]
     Label {
         /// Person.
@@ -33,47 +33,47 @@ pub enum ConvertError {
         /// What is wrong.
         source: LabelError,
     },
-    /// It was asked to stop.
+    /// The dataset was not converted because a stop was requested.
     #[error("the dataset was not converted")]
     Stopped(#[from] Stopped),
-    /// No pose of the flexion that was asked for.
+    /// No pose has the requested flexion.
     #[error("{0} holds no images of flexion {1}")]
     NoFlexion(String, &'static str),
 }
 
-/// What was converted.
+/// Counts of what was converted and left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Converted {
     /// Depth images in the new dataset.
     pub depth_images: usize,
-    /// Radiographs in it.
+    /// Radiographs in the new dataset.
     pub radiographs: usize,
-    /// Poses with a label in it.
+    /// Labelled poses in the new dataset.
     pub labels: usize,
-    /// Depth images that have no place in it: of other flexions, or later ones of a pose.
+    /// Depth images left out: of other flexions, or later ones of a pose.
     pub left_out: usize,
-    /// Radiographs that have none: of other flexions, or of poses without depth images.
+    /// Radiographs left out: of other flexions, or of poses without depth images.
     pub radiographs_left_out: usize,
-    /// Labels that have none, for the same reasons.
+    /// Labels left out, for the same reasons.
     pub labels_left_out: usize,
 }
 
-/// Writes the dataset in the other layout, in the folder `to`, whole or not at all.
+/// Writes the dataset in the other layout to the folder `to`, completely or not at all.
 ///
 /// *Synthetic to specimen*: all poses are filed under `flexion`, since a scan does not show it; the step becomes the image
 /// number, the body shape the time stamp (0 `orig`, 1 `big`, 2 `small`, 3 `bumps_a`, 4 `bumps_b`). The other flexions get empty
-/// lists, without which the authors' loader stops.
+/// lists, because the authors' loader fails without them.
 ///
-/// *Specimen to synthetic*: the poses of `flexion`; the image number becomes the step, and so the "angle" of a recorded pose is
-/// only half its number. Time stamps are body shapes if all are 0 to 4, else the earliest image of a pose becomes `orig` and the
-/// later ones are left out.
+/// *Specimen to synthetic*: only the poses of `flexion`; the image number becomes the step, so the "angle" of a recorded pose is
+/// only half its number. Time stamps become body shapes if all are 0 to 4; otherwise the earliest image of a pose becomes `orig` and
+/// the later ones are left out.
 ///
-/// Once `stop` is true it ends before the next image, and leaves nothing.
+/// Once `stop` is true, it ends before the next image and leaves nothing behind.
 ///
-/// Tallies (EXR), `manifest.jsonl` and `dataset.json` are not carried over.
+/// Tallies (EXR), `manifest.jsonl` and `dataset.json` are not copied.
 ///
 /// # Errors
-/// [`ConvertError`]; `to` must not exist or be empty.
+/// [`ConvertError`]; `to` must not exist or must be empty.
 pub fn convert(
     from: &Published,
     to: &Path,
@@ -140,7 +140,7 @@ impl Converted {
     }
 }
 
-/// A pair and its pose in the other layout.
+/// An image pair and its pose in the other layout.
 pub(super) struct Moved<'a> {
     pub pair: &'a ImagePair,
     pub pose: Pose,
@@ -208,7 +208,7 @@ fn rotated(from: &Published, wanted: Flexion) -> Result<Vec<Moved<'_>>, ConvertE
     Ok(moved)
 }
 
-/// One limb on its way to the new dataset.
+/// One limb being copied to the new dataset.
 pub(super) struct Copy<'a> {
     pub from: &'a Published,
     pub root: &'a Path,
@@ -222,7 +222,7 @@ impl Copy<'_> {
         let (from, to) = (self.from.root.join(from), self.root.join(to));
         let folder = to.parent().expect("files lie in folders of the dataset");
         fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
-        // `fs::copy` would wait for ever for somebody to write into a named pipe.
+        // `fs::copy` would wait forever on a named pipe without a writer.
         drop(ppa_core::regular_file::open(&from).map_err(FileError::at("copy", &from))?);
         fs::copy(&from, &to).map_err(FileError::at("copy", &from))?;
         Ok(())

@@ -13,7 +13,7 @@ use crate::layout::LimbId;
 use crate::manifest::{RoiFile, roi_text};
 
 impl Copy<'_> {
-    /// Lists of all flexions, of which only one is filled; the number of labels.
+    /// Writes the lists of all flexions, only one of which is filled; returns the number of labels.
     pub fn specimen_lists(&self, moved: &[Moved], filled: Flexion) -> Result<usize, FileError> {
         let (mut labels, mut rois) = (Map::new(), Map::new());
         for Moved { pair, pose } in moved {
@@ -61,7 +61,7 @@ impl Copy<'_> {
         Ok(labels.len())
     }
 
-    /// Lists of a limb; the number of labels.
+    /// Writes the lists of a limb; returns the number of labels.
     pub fn synthetic_lists(&self, moved: &[Moved]) -> Result<usize, ConvertError> {
         let (mut labels, mut rois) = (BTreeMap::new(), RoiFile::new());
         for Moved { pair, pose } in moved {

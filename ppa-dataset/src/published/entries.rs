@@ -12,7 +12,7 @@ use crate::labels::{LabelSource, Sources, name_of};
 use crate::layout::View;
 use crate::manifest::RoiRow;
 
-/// Of the specimen layout; `crate::labels::LabelFile` is that of the synthetic one.
+/// A label of the specimen layout; `crate::labels::LabelFile` holds those of the synthetic one.
 #[derive(Deserialize)]
 struct LabelEntry {
     label: f64,
@@ -30,7 +30,7 @@ struct RoiEntry {
     size: u32,
 }
 
-/// Labels of the specimen layout by number of the pose; none if the file is missing. `of_key` is the number in the name of a radiograph.
+/// Labels of the specimen layout by number of the pose; empty if the file is missing. `of_key` gives the number in a radiograph's name.
 pub(super) fn labels(
     path: &Path,
     of_key: impl Fn(&str) -> Option<u32>,
@@ -69,7 +69,7 @@ pub(super) fn labels(
     Ok(labels)
 }
 
-/// Regions by camera and number of the pose; none if the file is missing. `of_key` is the number in the name of a depth image.
+/// Regions by camera and number of the pose; empty if the file is missing. `of_key` gives camera and number from the name of a depth image.
 pub(super) fn rois(
     path: &Path,
     of_key: impl Fn(&str) -> Option<(View, u32)>,
@@ -111,7 +111,7 @@ pub(super) fn rois(
     Ok(rois)
 }
 
-/// The number of a pose, which entry and key both may state.
+/// The number of a pose, which both the entry and its key may state.
 fn one_number(entry: Option<u32>, key: Option<u32>) -> Result<u32, String> {
     match (entry, key) {
         (Some(entry), Some(key)) if entry != key => Err(format!(
@@ -133,7 +133,7 @@ fn entries<T: DeserializeOwned>(path: &Path) -> Result<Vec<(String, T)>, FileErr
     Ok(parsed.0)
 }
 
-/// The entries of an object in their order. A map would keep the last of two entries with one key without a word.
+/// The entries of an object in order. A map would silently keep only the last of two entries with the same key.
 struct UniqueKeys<T>(Vec<(String, T)>);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for UniqueKeys<T> {

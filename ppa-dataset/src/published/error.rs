@@ -9,13 +9,13 @@ use crate::labels::LabelFileError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PublishedError {
-    /// A file or folder.
+    /// A file or folder cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
     /// Labels of a limb in the synthetic layout.
     #[error(transparent)]
     Labels(#[from] LabelFileError),
-    /// No person in it.
+    /// The dataset contains no person.
     #[error("{} holds no images of patients: expected folders patient_0, patient_1, … or patient_1_l, patient_1_r, …", .0.display())]
     NoSubjects(PathBuf),
     /// Folders of both layouts.
@@ -26,23 +26,23 @@ pub enum PublishedError {
         /// A folder `patient_N`.
         synthetic: PathBuf,
     },
-    /// A file or folder whose name the layout does not know.
+    /// A file or folder whose name does not fit the layout.
     #[error("{} does not fit the layout: expected {expected}", path.display())]
     Name {
         /// The file or folder.
         path: PathBuf,
-        /// Names that stand there.
+        /// Names that the layout allows there.
         expected: &'static str,
     },
-    /// Two folders of one person or limb, as `patient_1` and `patient_01`.
+    /// Two folders of one person or limb, such as `patient_1` and `patient_01`.
     #[error("{} is another name for {}", second.display(), first.display())]
     SameSubject {
-        /// The folder as it should be called.
+        /// The folder with the correct name.
         first: PathBuf,
         /// The other one.
         second: PathBuf,
     },
-    /// An angle between the steps.
+    /// An angle that is not a step.
     #[error("{}: the angle is {angle} degrees, expected a multiple of 0.5 with one decimal", path.display())]
     OffGrid {
         /// The depth image.
@@ -50,7 +50,7 @@ pub enum PublishedError {
         /// The angle in its name.
         angle: String,
     },
-    /// Labels of radiographs that were made again since.
+    /// Labels of radiographs that have since been replaced.
     #[error(
         "{}: {} of radiographs that have since been replaced, the first at step {step}; create them again \
          (`ppa label auto` or `ppa label import`) or remove the file",
@@ -59,19 +59,19 @@ pub enum PublishedError {
     Outdated {
         /// `labels.json` of the limb.
         path: PathBuf,
-        /// Half degrees of rotation of the first of them.
+        /// Half degrees of rotation of the first of these radiographs.
         step: u32,
         /// Their number.
         count: usize,
     },
-    /// An entry of a JSON file that cannot be.
+    /// An invalid entry of a JSON file.
     #[error("{}, entry {key:?}: {message}", path.display())]
     Entry {
         /// The file.
         path: PathBuf,
         /// The entry's key.
         key: String,
-        /// What was found and what expected.
+        /// What was found and what was expected.
         message: String,
     },
 }

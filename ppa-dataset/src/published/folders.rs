@@ -28,7 +28,7 @@ impl Folder {
         }
     }
 
-    /// Names of folders (`true`) or files in it, sorted; none if it is missing. Hidden ones are left out.
+    /// Sorted names of the folders (`true`) or files in it, except hidden ones; empty if it is missing.
     fn names(&self, folders: bool) -> Result<Vec<String>, FileError> {
         let mut names = Vec::new();
         if !fs::exists(&self.path).map_err(FileError::at("read", &self.path))? {
@@ -77,7 +77,7 @@ pub(super) fn subjects(root: &Path) -> Result<Subjects, PublishedError> {
         path: root.to_owned(),
         name: String::new(),
     };
-    // A missing root would read as an empty one.
+    // Otherwise a missing root would read as an empty one.
     fs::read_dir(root).map_err(FileError::at("read", root))?;
     let names = of_root.folders()?;
     let mut folders = Vec::new();
@@ -140,7 +140,7 @@ fn usual_name(subject: &Subject) -> String {
     format!("patient_{}{}", subject.patient, side.unwrap_or_default())
 }
 
-/// A number of digits only: `parse` would take a sign as well.
+/// Parses a number of digits only: `parse` would also accept a sign.
 pub(super) fn digits<N: std::str::FromStr>(text: &str) -> Option<N> {
     let only_digits = text.bytes().all(|byte| byte.is_ascii_digit());
     only_digits.then(|| text.parse().ok())?

@@ -1,4 +1,4 @@
-//! Images of one channel with 16 bits.
+//! Single-channel 16-bit images.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -7,14 +7,14 @@ use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 
 use crate::files::FileError;
 
-/// Why a file is not an image of one channel with 16 bits.
+/// Why a file is not a single-channel 16-bit image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageFileError {
-    /// The file.
+    /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It is no PNG, or not a whole one.
+    /// The file is not a complete PNG.
     #[error("{} is not a complete PNG file", path.display())]
     Damaged {
         /// The image.
@@ -22,12 +22,12 @@ pub enum ImageFileError {
         /// What is wrong with it.
         source: image::ImageError,
     },
-    /// Its pixels are of another kind.
+    /// Its pixels are not 16-bit grey.
     #[error("{} holds {found} pixels, expected 16-bit grey", path.display())]
     Pixels {
         /// The image.
         path: PathBuf,
-        /// Channels and bits, as `8-bit RGB`.
+        /// Channels and bits, such as `8-bit RGB`.
         found: String,
     },
 }

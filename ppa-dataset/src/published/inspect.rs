@@ -28,22 +28,22 @@ pub struct Inspection {
     pub depth_images: usize,
     /// Depth images with a region of interest.
     pub regions: usize,
-    /// Radiographs that are PNG.
+    /// PNG radiographs.
     pub radiographs: usize,
     /// Image pairs whose pose has a label.
     pub labelled: usize,
     /// Whether hashes were compared with `manifest.jsonl`.
     pub manifest: bool,
-    /// What is wrong, in the order of the dataset.
+    /// The flaws found, in the order of the dataset.
     #[serde(skip)]
     pub flaws: Vec<Flaw>,
 }
 
 /// Reads the dataset in `root` in either layout, decodes all PNG files, and compares them with regions of interest, with each
-/// other and, where they are there, with `manifest.jsonl` (tallies too), `dataset.json` and `checksums.sha256`. Changes nothing.
+/// other and, if present, with `manifest.jsonl` (tallies too), `dataset.json` and `checksums.sha256`. Changes nothing.
 ///
 /// # Errors
-/// [`PublishedError`] for what fits no layout; single images are reported as [`Flaw`]s.
+/// [`PublishedError`] for anything that fits no layout; single images are reported as [`Flaw`]s.
 pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
     let dataset = Published::list(root)?;
     let unpaired = dataset.unpaired.iter().cloned();
@@ -61,7 +61,7 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
             .into_iter()
             .filter_map(|view| pair.depth(view))
             .collect();
-        // A whole camera may be missing.
+        // One camera may be missing altogether.
         if let [only] = views[..]
             && View::ALL
                 .iter()
@@ -125,7 +125,7 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
     })
 }
 
-/// Hash of an image, if it can be read, and what is wrong with it.
+/// Hash of an image, if it can be read, and its flaw, if any.
 fn look(root: &Path, file: &str, roi: Option<&RoiRow>) -> (Option<String>, Option<Flaw>) {
     let path = root.join(file);
     let bytes = match ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path)) {

@@ -7,10 +7,10 @@
 //! specimen   patient_1_l/{min,medium,max}/data/dataset/depth/depth_cam_{left,right}_orig_{image}_{timestamp}.png
 //!            …/xray/xray_{image}.png   …/label/quality/labels.json   …/label/roi/roi_depth.json
 //! ```
-//! In both, N of `patient_N` is the person, so that `patient_1_l` and `patient_1_r` are the two feet of one person. A side, a flexion, a
-//! body shape, a camera, radiographs, labels and regions of interest may be missing; what is there must fit the layout.
+//! In both, N of `patient_N` is the person, so `patient_1_l` and `patient_1_r` are the two feet of one person. A side, a flexion, a
+//! body shape, a camera, radiographs, labels and regions of interest may be missing; the existing files must fit the layout.
 //!
-//! [`Published::read`] looks at names and JSON files; [`GrayImage16::read`] decodes an image.
+//! [`Published::read`] reads names and JSON files; [`GrayImage16::read`] decodes an image.
 
 mod against_lists;
 mod convert;
@@ -42,7 +42,7 @@ use crate::labels::{LabelFile, LabelName, LabelSource};
 use crate::layout::{LimbId, View};
 use crate::manifest::{Manifest, RoiRow};
 
-/// Which of the published layouts.
+/// One of the two published layouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
@@ -52,13 +52,13 @@ pub enum Layout {
     Specimen,
 }
 
-/// How far the foot of a specimen was bent.
+/// How far the foot of a specimen was flexed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Flexion {
     /// Least.
     Min,
-    /// Between.
+    /// Medium.
     Medium,
     /// Most.
     Max,
@@ -78,29 +78,29 @@ impl Flexion {
     }
 }
 
-/// Which pose of a limb an image shows. Ordered by pose first, so that all images of a pose are neighbours.
+/// The pose of a limb that an image shows. Ordered by pose first, so that all images of a pose are neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(untagged)]
 pub enum Pose {
-    /// Of the synthetic layout.
+    /// A pose of the synthetic layout.
     Rotated {
         /// Half degrees of medial rotation.
         step: u32,
-        /// Variant of the skin; radiograph, label and region of interest are those of the pose.
+        /// Variant of the skin; radiograph, label and region of interest are shared by all variants of the pose.
         shape: BodyShape,
     },
-    /// Of the specimen layout.
+    /// A pose of the specimen layout.
     Recorded {
-        /// Bending of the foot.
+        /// Flexion of the foot.
         flexion: Flexion,
-        /// Number of the pose within limb and flexion; radiograph, label and region of interest are its.
+        /// Number of the pose within limb and flexion, which determines radiograph, label and region of interest.
         image_number: u32,
-        /// Grows with time from image to image of a pose; no unit.
+        /// Increases with time from image to image of a pose; no unit.
         timestamp: u64,
     },
 }
 
-/// What both cameras saw at one moment, with what is known of it.
+/// The images of both cameras at one moment, with their pose, radiograph and label.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImagePair {
     /// Person and side.
@@ -109,7 +109,7 @@ pub struct ImagePair {
     /// Its pose.
     #[serde(flatten)]
     pub pose: Pose,
-    /// Image of the left camera. At least one of both is there.
+    /// Image of the left camera. At least one of the two cameras has an image.
     pub left: Option<DepthFile>,
     /// Image of the right camera.
     pub right: Option<DepthFile>,
@@ -141,7 +141,7 @@ impl ImagePair {
 pub struct DepthFile {
     /// Path from the root.
     pub file: String,
-    /// Square region around the joint; may reach beyond the image.
+    /// Square region around the joint; may extend beyond the image.
     pub roi: Option<RoiRow>,
 }
 
@@ -150,13 +150,13 @@ pub struct DepthFile {
 pub struct Label {
     /// From 1 (ideal) to 3 (inadequate).
     pub label: f64,
-    /// Standard deviation over the readers (over all of them, not one less), or of what was assumed.
+    /// Standard deviation over the readers (divided by their number, not one less); of a computed label, half the range of grades.
     pub std: f64,
-    /// Who says so, if the file states it.
+    /// Source of the label, if the file states it.
     pub source: Option<LabelSource>,
 }
 
-/// A dataset as it lies on disk.
+/// A dataset on disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
     /// The folder that holds the folders of the persons.
@@ -165,31 +165,31 @@ pub struct Published {
     pub layout: Layout,
     /// By person, side and pose.
     pub pairs: Vec<ImagePair>,
-    /// Other files: those of poses without depth images.
+    /// Files and entries of poses without depth images.
     pub unpaired: Vec<Unpaired>,
 }
 
-/// What was found of a person or limb.
+/// Image pairs and unpaired files of a person or limb.
 type Found = (Vec<ImagePair>, Vec<Unpaired>);
 
 impl Published {
     /// Lists the dataset in `root` without decoding its images.
     ///
     /// # Errors
-    /// [`PublishedError`] naming the first file or entry that fits neither layout, or labels of radiographs that were made
-    /// again since.
+    /// [`PublishedError`] naming the first file or entry that fits neither layout, or labels of radiographs that have since been
+    /// replaced.
     pub fn read(root: &Path) -> Result<Self, PublishedError> {
         Self::read_labelled(root, None)
     }
 
-    /// As [`Published::read`], with the labels of a name in `labels.NAME.json` instead of those in `labels.json`.
+    /// The same as [`Published::read`], with the labels in `labels.NAME.json` instead of those in `labels.json`.
     ///
     /// # Errors
-    /// As [`Published::read`].
+    /// The same as [`Published::read`].
     pub fn read_labelled(root: &Path, labels: Option<&LabelName>) -> Result<Self, PublishedError> {
         let dataset = Self::list_labelled(root, labels)?;
         let found = outdated::outdated(&dataset, labels, || {
-            // Without a manifest the dataset is not finished, or not ours.
+            // Without a manifest, the dataset is unfinished or not ours.
             match root.join(Manifest::FILE).exists() {
                 true => Ok(Manifest::read(root)?),
                 false => Ok(Manifest::default()),
@@ -205,10 +205,10 @@ impl Published {
         }
     }
 
-    /// As [`Published::read`], labels that no longer belong to their radiographs included.
+    /// The same as [`Published::read`], but accepts labels of radiographs that have since been replaced.
     ///
     /// # Errors
-    /// As [`Published::read`].
+    /// The same as [`Published::read`], except for those labels.
     pub fn list(root: &Path) -> Result<Self, PublishedError> {
         Self::list_labelled(root, None)
     }
@@ -238,7 +238,7 @@ impl Published {
         })
     }
 
-    /// The persons in it, in order.
+    /// The persons in the dataset, in order.
     pub fn patients(&self) -> Vec<u32> {
         let mut patients: Vec<_> = self.pairs.iter().map(|pair| pair.limb.patient).collect();
         patients.dedup();

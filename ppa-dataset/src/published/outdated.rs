@@ -5,13 +5,13 @@ use crate::labels::{LabelFile, LabelName};
 use crate::layout::LimbId;
 use crate::manifest::Manifest;
 
-/// Labels of a limb that belong to other radiographs than those in the manifest.
+/// Labels of a limb whose radiographs differ from those in the manifest.
 pub(super) struct Outdated {
     pub limb: LimbId,
     pub steps: Vec<u32>,
 }
 
-/// All of them in the labels of a name, as far as labels state which bytes their radiographs had; `manifest` is read only if one does.
+/// Finds all outdated labels in a dataset's labels of a name, as far as they have hashes; `manifest` is read only if any has one.
 pub(super) fn outdated(
     dataset: &Published,
     labels: Option<&LabelName>,

@@ -14,7 +14,7 @@ pub(super) fn flexion_folder(limb: LimbId, flexion: Flexion) -> String {
     format!("patient_{patient}_{side}/{}/data/dataset", flexion.name())
 }
 
-/// All image pairs of one limb, and what else there is.
+/// Reads all image pairs and unpaired files of one limb.
 pub(super) fn read(
     limb_folder: &Folder,
     limb: LimbId,

@@ -1,4 +1,4 @@
-//! The synthetic layout, read.
+//! Reading of the synthetic layout.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::body_shape::BodyShape;
 use crate::labels::{LabelFile, LabelName};
 use crate::layout::{LimbId, Side, View, angle_text};
 
-/// All image pairs of one person, and what else there is.
+/// Reads all image pairs and unpaired files of one person.
 pub(super) fn read(
     root: &Path,
     patient: u32,
@@ -123,13 +123,13 @@ fn radiographs(folder: &Folder) -> Result<BTreeSet<u32>, PublishedError> {
     folder.images()?.into_iter().map(step).collect()
 }
 
-/// 36 of `xray_image_36.png`.
+/// The step in the name of a radiograph, such as 36 in `xray_image_36.png`.
 fn step_of_radiograph(name: &str) -> Option<u32> {
     let number = name.strip_prefix("xray_image_")?.strip_suffix(".png")?;
     digits(number).filter(|step: &u32| step.to_string() == number)
 }
 
-/// Camera and step of `depth_cam_left_18.0.png`; the angle where it is off the grid or written otherwise.
+/// Camera and step in a name such as `depth_cam_left_18.0.png`; the error is the angle if it is off the grid or written otherwise.
 fn depth_name(name: &str) -> Result<(View, u32), Option<String>> {
     let rest = |view: View| name.strip_prefix(&format!("depth_{}_", view.name()));
     let of_view = View::ALL

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{ImagePair, Pose};
 use crate::layout::View;
 
-/// A radiograph, or an entry of a list, whose pose has no depth image: no image pair mentions it.
+/// A radiograph, or an entry of a list, whose pose has no depth image, so that no image pair refers to it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Unpaired {
@@ -21,14 +21,14 @@ pub enum Unpaired {
     },
     /// A label.
     Label {
-        /// Its list, from the root.
+        /// Path of its list from the root.
         list: String,
         /// Step, or number of the pose.
         pose: u32,
     },
     /// A region of interest.
     Region {
-        /// Its list, from the root.
+        /// Path of its list from the root.
         list: String,
         /// Step, or number of the pose.
         pose: u32,
@@ -79,7 +79,7 @@ impl Seen {
         }
     }
 
-    /// Regions for images that are not there.
+    /// Regions of images that do not exist.
     pub fn regions_of_none<'a>(
         &self,
         list: &str,

@@ -47,7 +47,7 @@ fn every_person_stands_in_one_part_whatever_the_seed() {
     }
     drawn.sort();
     drawn.dedup();
-    // Two of 17 persons: 136 pairs. That 20 seeds give fewer than ten of them would be odd.
+    // Two of 17 persons: 136 pairs. Fewer than ten different ones from 20 seeds would be unlikely.
     assert!(drawn.len() >= 10, "{drawn:?}");
 }
 

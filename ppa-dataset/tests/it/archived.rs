@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::trees::Tree;
 
-/// Nobody stops what is tested here.
+/// Never set: no test stops the work.
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 #[test]
@@ -86,7 +86,7 @@ fn no_bag_is_made_of_what_is_altered_unfinished_or_no_dataset() {
     }
     let empty = tempfile::tempdir().unwrap();
     refused(empty.path(), "holds no images of patients");
-    // Datasets of others have no manifest.
+    // Datasets of other authors have no manifest.
     bag(Tree::specimen().root(), &to, &GO_ON).unwrap();
 }
 
@@ -116,7 +116,7 @@ fn what_is_stopped_leaves_nothing() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// Names and bytes of the files of an archive, in their order.
+/// Names and bytes of the files of an archive, in archive order.
 fn archived(path: &Path) -> Vec<(String, Vec<u8>)> {
     let mut archive = tar::Archive::new(fs::File::open(path).unwrap());
     let entries = archive.entries().unwrap().map(|entry| {

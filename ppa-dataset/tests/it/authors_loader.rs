@@ -1,5 +1,5 @@
-//! What the program that the authors published beside the specimen dataset loads from a folder, stated again from its
-//! behaviour (github.com/INB-KI-SIGS/patient-pose-assessment, `data/depth.py`), compared with what we read.
+//! Reimplementation of the behaviour of the program that the authors published with the specimen dataset
+//! (github.com/INB-KI-SIGS/patient-pose-assessment, `data/depth.py`): the rows it loads from a folder are compared with ours.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -20,7 +20,7 @@ fn json(path: &Path) -> Value {
 
 /// Every labelled image number, for each camera with its region, and the earliest `images_per_xray` images of it.
 ///
-/// As theirs, it fails where a foot lacks a flexion's labels or a labelled number its region.
+/// Like theirs, it fails if a foot lacks a flexion's labels or a labelled number lacks its region.
 pub fn rows(root: &Path, images_per_xray: usize) -> BTreeSet<Row> {
     let mut rows = BTreeSet::new();
     for foot in fs::read_dir(root).unwrap() {

@@ -1,4 +1,4 @@
-//! From one layout to the other and back.
+//! Conversion from one layout to the other and back.
 
 use std::fs;
 use std::path::Path;
@@ -9,10 +9,10 @@ use ppa_dataset::published::{Converted, Flexion, Layout, Published, convert};
 use crate::authors_loader;
 use crate::trees::Tree;
 
-/// Nobody stops what is tested here.
+/// Never set: no test stops the work.
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
-/// Everything a reader learns of a dataset but its paths, with the bytes of its images.
+/// Everything a reader learns about a dataset except its paths, with the bytes of its images.
 fn contents(root: &Path) -> Vec<String> {
     let read = Published::read(root).unwrap();
     let bytes = |file: &str| fs::read(root.join(file)).unwrap();
@@ -56,7 +56,7 @@ fn a_synthetic_dataset_survives_the_specimen_layout() {
     assert_eq!(done, expected);
     let read = Published::read(&specimen).unwrap();
     assert_eq!(read.layout, Layout::Specimen);
-    // The authors' program stops where the lists of a flexion are missing, and loads only what has a label.
+    // The authors' program stops if the lists of a flexion are missing, and loads only labelled images.
     let theirs = authors_loader::rows(&specimen, usize::MAX);
     assert_eq!(theirs.len(), 2 * 2 * 2 * 2);
     assert_eq!(authors_loader::our_rows(&specimen), theirs);
@@ -70,7 +70,7 @@ fn a_synthetic_dataset_survives_the_specimen_layout() {
 #[test]
 fn the_earliest_image_of_each_recorded_pose_is_taken() {
     let tree = Tree::specimen();
-    // Of a pose that no camera saw.
+    // A radiograph of a pose that no camera saw.
     tree.image("patient_1_l/max/data/dataset/xray/xray_7.png", 9000);
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("synthetic");

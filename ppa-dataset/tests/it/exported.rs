@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::trees::{POSE, Tree};
 
-/// Rows of a CSV file by column name, read by hand: no cell of ours holds a line break.
+/// Rows of a CSV file by column name, parsed by hand: none of our cells contains a line break.
 fn csv_rows(text: &str) -> Vec<BTreeMap<String, String>> {
     let cells = |line: &str| {
         let (mut cells, mut quoted) = (vec![String::new()], false);
@@ -185,7 +185,7 @@ fn metadata_describe_the_table_that_is_there() {
         .collect();
     assert_eq!(names.join(","), header.lines().next().unwrap());
     let ro_crate = json("ro-crate-metadata.json");
-    // Without it, the term would belong to no vocabulary.
+    // Without this context, the term would belong to no vocabulary.
     assert_eq!(
         ro_crate["@context"][1]["sha256"],
         "https://schema.org/sha256"
@@ -221,14 +221,14 @@ fn metadata_describe_the_table_that_is_there() {
     ] {
         assert!(sheet.contains(report), "{report}: {sheet}");
     }
-    // What people answered stays.
+    // People's answers are kept.
     let answered = sheet.replace("**To answer:** Who made it", "A university made it");
     fs::write(tree.path("datasheet.md"), &answered).unwrap();
     let files = write_metadata(tree.root(), &metadata, None, false).unwrap();
     assert_eq!(files[3], "datasheet.new.md");
     let read = |name: &str| fs::read_to_string(tree.path(name)).unwrap();
     assert_eq!([read("datasheet.md"), read(files[3])], [answered, sheet]);
-    // What is there and differs is written over only on request.
+    // Existing files that differ are overwritten only on request.
     let table = tree.path("manifest.csv");
     let csv = fs::read(&table).unwrap();
     fs::write(&table, "edited").unwrap();
@@ -242,7 +242,7 @@ fn metadata_describe_the_table_that_is_there() {
     assert_eq!(fs::read(&table).unwrap(), b"edited");
     write_metadata(tree.root(), &metadata, None, true).unwrap();
     assert_eq!(fs::read(&table).unwrap(), csv);
-    // A later table leaves the metadata behind.
+    // Metadata are outdated once the table changes.
     let stale = |tree: &Tree| {
         let found = inspect(tree.root()).unwrap().flaws;
         found.iter().any(|flaw| matches!(flaw, Flaw::Metadata(_)))

@@ -75,7 +75,7 @@ fn each_flaw_is_reported_with_its_file() {
     }
 }
 
-/// The layout allows that a camera is missing; it is then missing in each pose.
+/// The layout allows a missing camera; it is then missing in each pose.
 #[test]
 fn a_limb_that_one_camera_saw_alone_is_no_flaw() {
     let tree = Tree::synthetic();
@@ -144,7 +144,7 @@ fn tallies_scans_and_labels_are_compared_with_the_lists() {
     let same = "patients 0 and 12 come from the same scan according to dataset.json";
     assert!(flaws(&tree).contains(&same.to_owned()));
 
-    // A label shows which radiograph it was given to.
+    // A label states the radiograph it was given to.
     let tree = Tree::generated();
     let labels = "patient_0/labels/r/labels.json";
     let hash = sha256_of_file(&tree.path("patient_0/xray/r/xray_image_91.png")).unwrap();

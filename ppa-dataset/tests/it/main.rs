@@ -1,4 +1,4 @@
-//! Datasets as others wrote them, read, checked and written.
+//! Datasets of other authors, read, checked and written.
 
 mod archived;
 mod authors_loader;
@@ -60,7 +60,7 @@ fn the_specimen_layout_gives_a_row_per_moment() {
         first.left.as_ref().unwrap().file,
         "patient_1_l/min/data/dataset/depth/depth_cam_left_orig_0_1000.png"
     );
-    // Later images of a pose follow it, in the order of time rather than of their names.
+    // Later images of a pose follow it, ordered by time rather than by name.
     let times = read.pairs.iter().filter_map(|pair| match pair.pose {
         Pose::Recorded {
             image_number: 10,

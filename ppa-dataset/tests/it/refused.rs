@@ -1,4 +1,4 @@
-//! Datasets that fit no layout: refused, with the file at fault.
+//! Datasets that fit no layout are rejected, naming the file at fault.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use ppa_dataset::published::{GrayImage16, Published};
 
 use crate::trees::Tree;
 
-/// What reading says, with causes.
+/// The error of reading, with its causes.
 fn refusal(tree: &Tree) -> String {
     chain(&Published::read(tree.root()).unwrap_err())
 }

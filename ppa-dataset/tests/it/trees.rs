@@ -1,4 +1,4 @@
-//! Small datasets in the published layouts, written from the description of the formats alone.
+//! Small datasets in the published layouts, written only from the description of the formats.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -95,7 +95,7 @@ impl Tree {
         tree
     }
 
-    /// The synthetic tree with the lists that `ppa generate` writes, as far as exports look at them.
+    /// The synthetic tree with the lists that `ppa generate` writes, as far as exports read them.
     pub fn generated() -> Self {
         let tree = Self::synthetic();
         fs::write(tree.path("patient_0/xray/r/xray_image_91.exr"), "tallies").unwrap();
@@ -160,7 +160,7 @@ impl Tree {
         self.root().join(name)
     }
 
-    /// A 16-bit image whose pixels grow from `first`.
+    /// Writes a 16-bit image whose pixels increase from `first`.
     pub fn image(&self, name: &str, first: u16) {
         let image = ImageBuffer::from_fn(12, 9, |x, y| Luma([first + x as u16 + 12 * y as u16]));
         let path = self.parent_made(name);

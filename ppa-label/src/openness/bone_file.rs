@@ -7,10 +7,10 @@ use ppa_dataset::labels::BoneFile;
 
 use super::bones::{AnkleBones, BonesError};
 
-/// Bones of a file, and which they are.
+/// Bones read from a file.
 #[derive(Debug, Clone)]
 pub struct ReadBones {
-    /// Those around the joint.
+    /// The bones around the joint.
     pub bones: AnkleBones,
     /// SHA-256 over size, affine and numbers of the file.
     pub sha256: String,
@@ -20,10 +20,10 @@ pub struct ReadBones {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoneFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ppa_ct::ReadError),
-    /// Values that are no labels.
+    /// A value that is not a label.
     #[error("{} holds the value {found}, expected whole numbers of bones from 0 to 255", path.display())]
     Value {
         /// The file.
@@ -31,12 +31,12 @@ pub enum BoneFileError {
         /// The value.
         found: f32,
     },
-    /// The labels.
+    /// The labels do not give the bones.
     #[error("{}", path.display())]
     Bones {
         /// The file.
         path: PathBuf,
-        /// What is wrong with them.
+        /// The error.
         source: BonesError,
     },
 }
@@ -44,7 +44,7 @@ pub enum BoneFileError {
 /// Reads the bones around a joint in the `ct` frame.
 ///
 /// # Errors
-/// [`BoneFileError`] naming the file: values that are no labels, a bone missing near the joint.
+/// [`BoneFileError`] naming the file, for values that are not labels or a bone that is missing near the joint.
 pub fn read_bones(file: &BoneFile, joint: &Point3<f64>) -> Result<ReadBones, BoneFileError> {
     let volume = ppa_ct::read(&file.path)?.volume;
     let label = |found: f32| match (0.0..=255.0).contains(&found) && found.fract() == 0.0 {

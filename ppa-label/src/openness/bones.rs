@@ -34,7 +34,7 @@ impl AnkleBone {
 }
 
 impl AnkleBone {
-    /// The number that stands for it.
+    /// The label of the bone.
     pub(crate) fn number(self, numbers: BoneNumbers) -> u8 {
         match self {
             Self::Tibia => numbers.tibia,
@@ -48,7 +48,7 @@ impl AnkleBone {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BonesError {
-    /// Labels and lattice disagree.
+    /// The number of labels differs from the number of voxels.
     #[error("{}, expected {expected}, one per voxel", ppa_core::text::count(*found, "label"))]
     Count {
         /// Labels.
@@ -56,7 +56,7 @@ pub enum BonesError {
         /// Voxels.
         expected: usize,
     },
-    /// Voxels in which a gutter is hardly wider than its blur.
+    /// Voxels so large that a gutter is hardly wider than its blur.
     #[error("voxels of {} mm, expected at most {MOST_VOXEL_MM} mm along each axis: a gutter is 2 to 3 mm wide",
         found_mm.map(|side| format!("{side:.2}")).join(" x "))]
     Coarse {
@@ -70,16 +70,16 @@ pub enum BonesError {
         bone: &'static str,
         /// Its label.
         label: u8,
-        /// How far was looked.
+        /// Half the side of the searched box.
         reach_mm: f64,
     },
 }
 
-/// Half the side of the box around the joint that is looked at, mm: the whole talus and both malleoli.
+/// Half the side of the box around the joint that is searched, mm: it includes the whole talus and both malleoli.
 const REACH_MM: f64 = 60.0;
 /// Longest side of a voxel, mm: the blur and the rim of a facet grow with it, and a gutter of 2.5 mm is then two voxels wide.
 const MOST_VOXEL_MM: f64 = 1.25;
-/// Blur of the labels, voxels: it turns their stairs into surfaces good to about a tenth of a voxel.
+/// Blur of the labels, voxels: it smooths the stair-stepped surface to about a tenth of a voxel.
 const BLUR_VOXELS: f64 = 0.8;
 
 /// The bones around an ankle: blurred indicators whose level 1/2 is the surface.
@@ -91,7 +91,7 @@ pub struct AnkleBones {
     spacing_mm: Vector3<f64>,
     /// Tibia, fibula, talus.
     bodies: [Body; 3],
-    /// Every bone.
+    /// All bones.
     skeleton: Body,
 }
 
@@ -99,7 +99,7 @@ pub struct AnkleBones {
 #[derive(Debug, Clone)]
 pub(super) struct Body {
     values: Vec<f32>,
-    /// Blocks of cells between eight voxels each: those on one side of the surface are uniform.
+    /// Blocks of cells between eight voxels each; blocks entirely on one side of the surface are uniform.
     blocks: Blocks,
 }
 
@@ -120,8 +120,8 @@ impl Body {
         Self { values, blocks }
     }
 
-    /// Whether the points of a cell and those around it are inside, and how many voxels every coordinate may change until the surface
-    /// can come; `None` near it.
+    /// Whether the points of a cell and those around it are inside, and by how many voxels every coordinate may change before the surface
+    /// is reached; `None` near it.
     pub fn side(&self, cell: [usize; 3]) -> Option<(bool, usize)> {
         self.blocks.uniform(cell)
     }
@@ -133,11 +133,11 @@ impl Body {
 }
 
 impl AnkleBones {
-    /// The bones within 60 mm of the joint, from one label per voxel, i fastest; 0 is no bone.
+    /// Builds the bones within 60 mm of the joint from one label per voxel, i fastest; 0 is no bone.
     ///
     /// # Errors
-    /// [`BonesError`] when a label is missing near the joint, voxels are larger than 1.25 mm, or the number of labels is not
-    /// the lattice's.
+    /// [`BonesError`] when a label is missing near the joint, voxels are larger than 1.25 mm, or the number of labels differs from the
+    /// number of voxels.
     pub fn new(
         grid: &Grid,
         labels: &[u8],
@@ -239,7 +239,7 @@ impl AnkleBones {
         mix(face(first), face(first + nx * ny), fz)
     }
 
-    /// The cell between eight voxels in which a point lies.
+    /// The cell between eight voxels that contains a point.
     pub(super) fn cell(&self, voxel: &Point3<f64>) -> Option<[usize; 3]> {
         let [nx, ny, nz] = self.size;
         let inside = |v: f64, n: usize| v >= 0.0 && v < (n - 1) as f64;
@@ -247,7 +247,7 @@ impl AnkleBones {
             .then(|| [voxel.x as usize, voxel.y as usize, voxel.z as usize])
     }
 
-    /// Outward unit normal of a body in the `ct` frame, from central differences half a voxel apart; `None` where the body
+    /// Outward unit normal of a body in the `ct` frame, from central differences over half a voxel to each side; `None` if the body
     /// has no slope.
     pub(super) fn normal(&self, body: &Body, p: &Point3<f64>) -> Option<Vector3<f64>> {
         let step = 0.5 * self.spacing_mm.min();
@@ -277,7 +277,7 @@ pub(crate) fn box_around(grid: &Grid, joint: &Point3<f64>) -> ([usize; 3], [usiz
     (low, size)
 }
 
-/// Gaussian blur along the three axes; beyond the box its border continues.
+/// Gaussian blur along the three axes; values outside the box are those of its border.
 fn blur(mut values: Vec<f32>, size: [usize; 3]) -> Vec<f32> {
     const REACH: isize = 3;
     let weight = |d: isize| (-0.5 * (d as f64 / BLUR_VOXELS).powi(2)).exp();

@@ -24,7 +24,8 @@ impl Exposure {
         }
     }
 
-    /// The central beam through the joint, across the limb's axis, turned about it; `distance_mm` from source to joint.
+    /// The exposure whose central beam passes through the joint perpendicular to the limb's axis, rotated about that axis; `distance_mm`
+    /// from source to joint.
     pub(super) fn around(limb: &LimbAxes, angle_rad: f64, distance_mm: f64) -> Self {
         let turn = UnitQuaternion::from_axis_angle(&limb.axis, angle_rad);
         let towards_source = turn * limb.anterior.into_inner();
@@ -36,7 +37,7 @@ impl Exposure {
         }
     }
 
-    /// Where the ray through a point meets the plane through the joint: along rows and columns, mm from the joint.
+    /// Intersection of the ray through a point with the plane through the joint: along rows and columns, mm from the joint.
     pub(super) fn projected(&self, point: &Point3<f64>) -> [f64; 2] {
         let normal = self.across.cross(&self.along);
         let ray = point - self.source;
@@ -55,7 +56,7 @@ impl Exposure {
     }
 }
 
-/// A limb at its joint: axis towards proximal, and the direction that faces the tube when the limb is not turned.
+/// A limb at its joint: axis towards proximal, and the direction that faces the tube when the limb is not rotated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LimbAxes {
     pub joint: Point3<f64>,

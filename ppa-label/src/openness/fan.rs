@@ -8,12 +8,12 @@ use super::gutter::Gap;
 use super::joint_space::JointSpace;
 use super::rays::Ray;
 
-/// Depth below the plafond at which malleoli and talus are compared, mm: below the lips of the plafond, above the tips.
+/// Depth below the plafond at which malleoli and talus are compared, mm: below the lips of the plafond, above the tips of the malleoli.
 pub(super) const MALLEOLI_MM: f64 = 7.0;
-/// How far beside the joint bones are looked for, and in which steps, mm.
+/// Search range for bones to each side of the joint, and its step, mm.
 const REACH_MM: f64 = 50.0;
 const STEP_MM: f64 = 0.2;
-/// The incisura is at least so deep between its tubercles, mm.
+/// Smallest depth of the incisura between its tubercles, mm.
 const LEAST_DEPTH_MM: f64 = 0.3;
 
 /// The rays of one row of the detector, from lateral to medial.
@@ -23,7 +23,7 @@ pub(super) struct Fan<'a> {
 }
 
 impl JointSpace {
-    /// The rays that meet the limb's axis so far above the mean height of the plafond.
+    /// The rays that meet the limb's axis at the given height above the mean height of the plafond.
     pub(super) fn fan(&self, exposure: &Exposure, above_plafond_mm: f64) -> Fan<'_> {
         let height = self.plafond_mm() + above_plafond_mm;
         let level = self.limb.joint + self.limb.axis.scale(height);
@@ -50,7 +50,7 @@ impl JointSpace {
         (point - self.limb.joint).dot(&self.limb.axis)
     }
 
-    /// 1 where `across` points from the fibula to the medial malleolus, else −1.
+    /// 1 if `across` points from the fibula to the medial malleolus, otherwise −1.
     pub(super) fn medial_sign(&self, exposure: &Exposure) -> f64 {
         let mean = |gaps: &[Gap]| {
             let across = gaps.iter().map(|gap| exposure.projected(&gap.foot)[0]);
@@ -61,7 +61,7 @@ impl JointSpace {
 }
 
 impl Fan<'_> {
-    /// First and last place of a bone's shadow, mm from lateral.
+    /// First and last position of a bone's shadow, mm from lateral.
     pub fn edges(&self, bone: AnkleBone) -> Option<[f64; 2]> {
         let body = self.bones.body(bone);
         let hit = |ray: &Ray| ray.meets(self.bones, body);
@@ -70,8 +70,8 @@ impl Fan<'_> {
         Some([first, last].map(|n| n as f64 * STEP_MM))
     }
 
-    /// The most medial place of a bone's lateral outline between two tubercles, mm from lateral: the line as which the floor of the incisura is
-    /// projected.
+    /// The most medial position of a bone's lateral outline between two tubercles, mm from lateral: the projection of the floor of the
+    /// incisura.
     pub fn notch(&self, bone: AnkleBone) -> Option<f64> {
         let body = self.bones.body(bone);
         let depths = self.columns.first()?.points().count();
@@ -86,7 +86,7 @@ impl Fan<'_> {
         let first = outline.iter().position(|edge| edge.is_finite())?;
         let last = outline.iter().rposition(|edge| edge.is_finite())?;
         let outline = &outline[first..=last];
-        // How far the outline falls short of the farther out of what stands in front of and behind it.
+        // Depth relative to the more medial of the two tubercles, the most lateral points in front and behind.
         let foremost = |edges: &[f64]| edges.iter().copied().fold(f64::INFINITY, f64::min);
         (0..outline.len())
             .map(|n| {

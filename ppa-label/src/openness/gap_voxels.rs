@@ -1,4 +1,4 @@
-//! The voxels through which a gutter runs.
+//! The voxels of a gutter.
 
 use nalgebra::Point3;
 
@@ -11,7 +11,7 @@ use super::gutter::Gap;
 pub(super) struct GapVoxels {
     size: [usize; 3],
     within: Vec<bool>,
-    /// Blocks without a voxel of a gap are uniform.
+    /// Blocks without a gap voxel are uniform.
     blocks: Blocks,
 }
 
@@ -61,7 +61,7 @@ impl GapVoxels {
     }
 }
 
-/// `value.round()`, halves away from 0, where that is 0 or more: without the call into the C library that it is on plain x86-64.
+/// `value.round()`, halves away from 0, if that is at least 0; avoids the call into the C library that `round` is on plain x86-64.
 fn nearest_whole(value: f64) -> Option<usize> {
     if value <= -0.5 {
         return None;

@@ -6,7 +6,7 @@ use super::bones::{AnkleBone, AnkleBones, Body};
 
 /// Wider gaps are not joint space, mm.
 const WIDEST_MM: f64 = 6.0;
-/// Opposing faces look at each other: cosine of the largest angle between one's normal and the other's reversed.
+/// Two faces oppose each other: cosine of the largest angle between the normal of one and the reversed normal of the other.
 const FACING: f64 = 0.5;
 
 /// Width of the rim of a facet, mm.
@@ -15,23 +15,23 @@ const RIM_MM: f64 = 1.5;
 /// Where the talus faces another bone across the joint space.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gap {
-    /// On the talus, `ct`.
+    /// Point on the talus, `ct`.
     pub foot: Point3<f64>,
-    /// From the talus across.
+    /// Direction from the talus across the gap.
     pub across: Vector3<f64>,
-    /// To the other bone, mm.
+    /// Distance to the other bone, mm.
     pub width_mm: f64,
 }
 
 impl Gap {
-    /// On the other bone, `ct`.
+    /// Point on the other bone, `ct`.
     pub fn end(&self) -> Point3<f64> {
         self.foot + self.across * self.width_mm
     }
 }
 
 /// The gaps from the talus to `other`, one for each voxel of the talus that has a neighbour outside it, without the
-/// outermost 1.5 mm of the facet: past its rim rays are free whatever their direction.
+/// outermost 1.5 mm of the facet: beyond its rim, rays are free in any direction.
 pub(super) fn gaps(bones: &AnkleBones, other: AnkleBone) -> Vec<Gap> {
     let talus = bones.body(AnkleBone::Talus);
     let gaps: Vec<Gap> = border_voxels(bones.size(), talus.values())
@@ -105,7 +105,7 @@ fn leave(
     Some(from + along * bisect(out - step, out, inside))
 }
 
-/// The end of the stretch from `low` on which `holds`, to a thousandth of a millimetre.
+/// The end of the interval from `low` on which `holds` is true, to a thousandth of a millimetre.
 fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     while high - low > 1e-3 {
         let middle = 0.5 * (low + high);
@@ -118,7 +118,7 @@ fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Whether a gap lies across the limb's axis, as that between trochlea and plafond does.
+/// Whether a gap faces along the limb's axis, like that between trochlea and plafond.
 pub(super) fn is_superior(gap: &Gap, axis: &Unit<Vector3<f64>>) -> bool {
     // Half-way between the plafond (0°) and the medial facet (66° on average).
     const STEEPEST: f64 = 0.8;

@@ -11,7 +11,7 @@ use super::joint_space::JointSpace;
 /// Distance between the levels at which malleolus and talus are compared, mm.
 const LEVELS_MM: f64 = 2.0;
 
-/// What an exposure hides of the medial and the lateral gutter, below the lips of the plafond.
+/// How much an exposure hides of the medial and the lateral gutter, below the lips of the plafond.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HiddenGutters {
     /// Medial gutter, behind or in front of the medial malleolus.
@@ -20,17 +20,17 @@ pub struct HiddenGutters {
     pub lateral: Hidden,
 }
 
-/// What an exposure hides of one gutter.
+/// How much an exposure hides of one gutter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Hidden {
     /// Share of the gutter's height at which the shadows of malleolus and talus overlap, 0 to 1.
     pub share: f64,
-    /// Width of that overlap, 0 where the shadows are apart: the median over the gutter's height, mm in the plane through the joint.
+    /// Width of that overlap, 0 where the shadows do not overlap: the median over the gutter's height, mm in the plane through the joint.
     pub median_mm: f64,
 }
 
 impl JointSpace {
-    /// What an exposure hides of the medial and the lateral gutter.
+    /// How much an exposure hides of the medial and the lateral gutter.
     ///
     /// The shadows of malleolus and talus are compared at levels 2 mm apart, from 7 mm below the plafond, where its lips end, down
     /// to the lowest place at which the two bones face each other.

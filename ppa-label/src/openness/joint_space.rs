@@ -38,7 +38,7 @@ impl fmt::Display for Gutter {
     }
 }
 
-/// Why bones have no joint space that could be seen.
+/// Why bones have no usable joint space.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum JointSpaceError {
@@ -48,12 +48,12 @@ pub enum JointSpaceError {
         opposite = if *.0 == Gutter::Lateral { "fibula" } else { "tibia" }
     )]
     NoGutter(Gutter),
-    /// No direction of the beam opens a gutter.
+    /// A gutter is not open from any direction of the beam.
     #[error(
         "the {0} gutter is not open from any direction around the limb: the bones may not be separated"
     )]
     NeverOpen(Gutter),
-    /// No direction of the beam opens all of them.
+    /// No direction of the beam opens all gutters.
     #[error(
         "the three gutters are not open at once from any direction around the limb: the worst one never shows more than \
          {0:.2} of what it could, expected at least {LEAST_ATTAINABLE}"
@@ -61,11 +61,11 @@ pub enum JointSpaceError {
     NeverTogether(f64),
 }
 
-/// Bone on a ray that still counts as free, mm: three tolerances, the middle one for the label, the others for its
+/// Length of bone on a ray that still counts as free, mm: three tolerances, the middle one for the label, the others for its
 /// uncertainty.
 pub const FREE_CHORDS_MM: [f64; 3] = [0.5, 1.0, 2.0];
 
-/// Openness of each gutter to one exposure, 0 closed to 1 as open as any direction around the limb makes it.
+/// Openness of each gutter to one exposure, from 0 (closed) to 1 (the most open from any direction around the limb).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Openness {
     /// Medial gutter, for each of [`FREE_CHORDS_MM`].
@@ -74,26 +74,26 @@ pub struct Openness {
     pub superior: f64,
     /// Lateral gutter, for each of [`FREE_CHORDS_MM`].
     pub lateral: [f64; 3],
-    /// What [`worst`](Self::worst) is from the direction around the limb that opens all three best: below 1, since the
-    /// facets are not parallel.
+    /// [`worst`](Self::worst) from the direction around the limb that opens all three gutters best: below 1, since the facets are
+    /// not parallel.
     pub attainable: [f64; 3],
 }
 
 impl Openness {
-    /// The worst gutter decides; for each of [`FREE_CHORDS_MM`].
+    /// Openness of the worst gutter, for each of [`FREE_CHORDS_MM`].
     pub fn worst(&self) -> [f64; 3] {
         std::array::from_fn(|n| self.medial[n].min(self.superior).min(self.lateral[n]))
     }
 }
 
-/// Turns about the limb's axis among which the most open one is looked for, degrees: all, and those around the best.
+/// Search for the most open rotation about the limb's axis, degrees: coarse steps over the full range, then fine steps around the best.
 const FARTHEST_DEG: f64 = 48.0;
 const COARSE_DEG: f64 = 4.0;
 const FINE_DEG: f64 = 0.5;
-/// Below this the shapes are hardly those of an ankle. P09, whose facets part most among the phantoms, reaches 0.29.
+/// Below this, the shapes are hardly those of an ankle. P09, whose facets diverge most among the phantoms, reaches 0.29.
 const LEAST_ATTAINABLE: f64 = 0.1;
 
-/// The gutters of an ankle, ready to be seen from any direction.
+/// The gutters of an ankle, which can be viewed from any direction.
 #[derive(Debug, Clone)]
 pub struct JointSpace {
     pub(super) bones: AnkleBones,
@@ -111,7 +111,7 @@ pub(super) struct SeenGap {
     pub voxels: GapVoxels,
 }
 
-/// What an exposure shows: areas in mm² for each of [`FREE_CHORDS_MM`], and contrast.
+/// Visible parts of the gutters: areas in mm² for each of [`FREE_CHORDS_MM`], and contrast.
 #[derive(Debug, Clone, Copy)]
 struct Visible {
     medial: [f64; 3],
@@ -124,7 +124,7 @@ impl JointSpace {
     /// y anterior.
     ///
     /// # Errors
-    /// [`JointSpaceError::NoGutter`] when talus and tibia or fibula nowhere face each other across at most 6 mm.
+    /// [`JointSpaceError::NoGutter`] when talus and tibia or fibula do not face each other anywhere across at most 6 mm.
     pub fn new(
         bones: AnkleBones,
         ct_from_patient: &Isometry3<f64>,
@@ -152,18 +152,18 @@ impl JointSpace {
         })
     }
 
-    /// How open the gutters are to an exposure.
+    /// Openness of the gutters to each exposure.
     ///
-    /// Medial and lateral gutter, whose faces are nearly plane: the area through which rays pass that run along the gap and meet at most a tolerated
-    /// length ([`FREE_CHORDS_MM`]) of the two bones next to it, relative to the largest such area from any direction around the
-    /// limb. For a slab of width w and depth L this is 1 − L tan φ / w at an angle φ off its plane.
+    /// Medial and lateral gutter, whose faces are nearly plane: the area of the rays that run along the gap and meet at most a tolerated
+    /// length ([`FREE_CHORDS_MM`]) of the two adjacent bones, relative to the largest such area from any direction around the limb.
+    /// For a slab of width w and depth L this is 1 − L tan φ / w at an angle φ off its plane.
     ///
-    /// Superior gutter: the plafond's edges reach below the dome, so that no ray is free of bone. Its contrast counts,
-    /// 1 − (least bone in the gap) / (most bone beside it), all bones taken together, averaged over the columns of the
+    /// Superior gutter: the plafond's edges extend below the dome, so no ray is free of bone. Its openness is the contrast
+    /// 1 − (least bone in the gap) / (most bone next to it), with all bones together, averaged over the columns of the
     /// image, relative to the highest contrast from any direction around the limb.
     ///
     /// # Errors
-    /// [`JointSpaceError::NeverOpen`] if a gutter is open from no direction, [`JointSpaceError::NeverTogether`] if no
+    /// [`JointSpaceError::NeverOpen`] if a gutter is not open from any direction, [`JointSpaceError::NeverTogether`] if no
     /// direction opens all of them.
     pub fn openness(&self, exposures: &[Exposure]) -> Result<Vec<Openness>, JointSpaceError> {
         let Some(first) = exposures.first() else {
@@ -227,7 +227,7 @@ impl JointSpace {
             .collect())
     }
 
-    /// What exposures show, each with the number that stands beside it.
+    /// What exposures show, each with the number passed with it.
     fn visible(&self, exposures: &[(f64, Exposure)]) -> Vec<(f64, Visible)> {
         let seen = |(degrees, exposure): &(f64, Exposure)| {
             let visible = Visible {
@@ -241,7 +241,7 @@ impl JointSpace {
     }
 }
 
-/// The most that any direction shows: the best of the coarse ones, then the best around it.
+/// The largest value from any direction: the best coarse one is refined by the fine ones around it.
 fn most_of<const N: usize>(
     coarse: &[(f64, Visible)],
     of: impl Fn(&Visible) -> [f64; N],
@@ -256,7 +256,7 @@ fn most_of<const N: usize>(
     best_of(near.into_iter()).0
 }
 
-/// The best by the middle one of three tolerances, or by the only value; the first of equals.
+/// The best by the middle one of three tolerances, or by the only value; the first of equal ones.
 fn best_of<const N: usize>(all: impl Iterator<Item = ([f64; N], f64)>) -> ([f64; N], f64) {
     let better = |a: ([f64; N], f64), b: ([f64; N], f64)| {
         if b.0[N / 2] > a.0[N / 2] { b } else { a }

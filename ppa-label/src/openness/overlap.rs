@@ -1,4 +1,4 @@
-//! Overlaps and clear spaces of the ankle, as they are measured on radiographs; mm in the plane through the joint.
+//! Overlaps and clear spaces of the ankle as measured on radiographs; mm in the plane through the joint.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use super::fan::MALLEOLI_MM;
 use super::gutter::Gap;
 use super::joint_space::JointSpace;
 
-/// What a radiograph shows of an ankle, mm, free of magnification; `None` where it is not to be seen.
+/// Measures of an ankle in a radiograph, mm, free of magnification; `None` if not visible.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Overlaps {
     /// Tibiofibular overlap 1 cm above the plafond: from the lateral edge of the tibia's anterior tubercle to the medial edge of
@@ -22,15 +22,15 @@ pub struct Overlaps {
     pub superior_clear_space_mm: Option<f64>,
     /// How far the medial malleolus covers the talus 7 mm below the plafond; below 0 where they are apart.
     pub medial_malleolus_overlap_mm: Option<f64>,
-    /// The same of the lateral malleolus.
+    /// The same for the lateral malleolus.
     pub lateral_malleolus_overlap_mm: Option<f64>,
-    /// How far the highest place of the trochlea's medial half lies above that of its lateral half, along the columns.
+    /// Height of the highest point of the trochlea's medial half above that of its lateral half, along the columns.
     pub talar_crest_offset_mm: f64,
 }
 
 /// Height above the plafond, mm (Harper & Keller, Foot Ankle 1989).
 const LEVEL_MM: f64 = 10.0;
-/// The beam runs along a gap within this sine, 6 degrees.
+/// Sine of the largest angle at which the beam counts as along a gap, 6 degrees.
 const ALONG: f64 = 0.1;
 
 impl JointSpace {

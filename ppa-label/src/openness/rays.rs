@@ -7,13 +7,13 @@ use super::exposure::Exposure;
 use super::gap_voxels::GapVoxels;
 use super::gutter::Gap;
 
-/// Pixels in the plane through the joint, mm.
+/// Pixel size in the plane through the joint, mm.
 pub(super) const PIXEL_MM: f64 = 0.25;
-/// Steps along rays, mm.
+/// Step length along rays, mm.
 pub(super) const STEP_MM: f64 = 0.4;
-/// Half the length of rays around the joint, mm.
+/// Half the length of rays, to each side of the plane through the joint, mm.
 const HALF_RAY_MM: f64 = 60.0;
-/// Half the depth within which gaps lie, mm.
+/// Half the depth range of gaps, mm.
 const HALF_GAP_MM: f64 = 30.0;
 
 /// A rectangle of the plane through the joint: first and last along rows and columns, mm from the joint.
@@ -46,7 +46,7 @@ impl Window {
     }
 }
 
-/// Middles of equal steps that cover a stretch.
+/// Midpoints of equal steps that cover an interval.
 pub(super) fn middles([low, high]: [f64; 2], step: f64) -> impl Iterator<Item = f64> + Clone {
     let count = ((high - low) / step).ceil().max(1.0) as usize;
     let step = (high - low) / count as f64;
@@ -62,7 +62,7 @@ pub(super) struct Ray {
 }
 
 impl Ray {
-    /// From the source through a point of the plane through the joint.
+    /// The ray from the source through a point of the plane through the joint.
     pub fn through(exposure: &Exposure, [across, along]: [f64; 2], bones: &AnkleBones) -> Self {
         let target = exposure.joint + exposure.across * across + exposure.along * along;
         let direction = (target - exposure.source).normalize();
@@ -73,7 +73,7 @@ impl Ray {
         }
     }
 
-    /// Middles of its steps, voxels.
+    /// Midpoints of its steps, voxels.
     pub fn points(&self) -> impl Iterator<Item = Point3<f64>> {
         (0..self.steps).map(|n| self.point(n))
     }
@@ -90,7 +90,7 @@ impl Ray {
 
     /// Length inside the voxels of gaps that lies within 30 mm of the plane through the joint, mm.
     pub fn path_mm(&self, gaps: &GapVoxels) -> f64 {
-        // Every other point does: gaps are long.
+        // Every other point is enough: gaps are long.
         const STRIDE: usize = 2;
         let skipped = ((HALF_RAY_MM - HALF_GAP_MM) / STEP_MM) as usize;
         let (mut step, mut within) = (skipped, 0_u32);
@@ -106,9 +106,9 @@ impl Ray {
         STRIDE as f64 * STEP_MM * f64::from(within)
     }
 
-    /// Length inside bodies, mm; a stretch in two of them counts once. A chord longer than `most_mm` is not followed on.
+    /// Length inside bodies, mm; overlapping parts count once. Stops once the length exceeds `most_mm`.
     ///
-    /// Surfaces are taken where the line between two steps passes level 1/2, so that chords do not come in whole steps.
+    /// Surfaces are at level 1/2, interpolated linearly between two steps, so chords are not multiples of the step.
     pub fn chord_mm(&self, bones: &AnkleBones, bodies: &[&Body], most_mm: f64) -> f64 {
         let depth = |step: usize| {
             let point = self.point(step);
@@ -135,7 +135,7 @@ impl Ray {
             was_inside = inside;
             let next = (step + alike).min(self.steps);
             if inside {
-                // Added one by one, so that rounding is that of single steps.
+                // Added one by one to get the same rounding as single steps.
                 for _ in step + 1..next {
                     chord_mm += STEP_MM;
                     if chord_mm > most_mm {
@@ -162,8 +162,8 @@ impl Ray {
         false
     }
 
-    /// Whether the point of a step is inside a body, and by how many voxels every coordinate may change while that holds; `None` near
-    /// a surface.
+    /// Whether the point of a step is inside a body, and by how many voxels every coordinate may change while that remains true; `None`
+    /// near a surface.
     fn side(&self, step: usize, bones: &AnkleBones, bodies: &[&Body]) -> Option<(bool, usize)> {
         let Some(cell) = bones.cell(&self.point(step)) else {
             return Some((false, 0));

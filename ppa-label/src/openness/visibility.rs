@@ -6,10 +6,10 @@ use ppa_xray::Detector;
 use super::gutter::Gap;
 use super::joint_space::JointSpace;
 
-/// A radiograph as it was measured: readings and their standard errors, row-major, in one unit.
+/// A measured radiograph: readings and their standard errors, row-major, in one unit.
 #[derive(Debug, Clone, Copy)]
 pub struct Reading<'a> {
-    /// Pixels and their size.
+    /// Number and size of the pixels.
     pub detector: &'a Detector,
     /// Source-detector distance, mm.
     pub source_detector_mm: f64,
@@ -21,7 +21,7 @@ pub struct Reading<'a> {
     pub sigma: &'a [f32],
 }
 
-/// Visibility of the gutters in a radiograph; 0 is not to be seen.
+/// Visibility of the gutters in a radiograph; 0 is invisible.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visibility {
     /// Medial gutter.
@@ -34,13 +34,13 @@ pub struct Visibility {
 
 /// The gap must exceed the noise by this many standard errors: by chance one place in a thousand does.
 const LEAST_CNR: f64 = 3.0;
-/// How far beside the gap the bone is read, mm in the plane through the joint.
+/// Distance from the gap at which the bone is read, mm in the plane through the joint.
 const BESIDE_MM: f64 = 2.0;
 
 impl JointSpace {
-    /// Visibility of each gutter: the mean over its places of the contrast ln(reading in the gap / reading next to it), which is taken against the
-    /// margin from which it differs less and counts as 0 unless it exceeds three standard errors. A gap that the beam crosses obliquely has no such
-    /// contrast.
+    /// Visibility of each gutter: the mean over its places of the contrast ln(reading in the gap / reading next to it). The contrast is
+    /// taken with the brighter of the two margins and counts as 0 unless it exceeds three standard errors. A gap that the beam crosses
+    /// obliquely has no such contrast.
     pub fn visibility(&self, reading: &Reading) -> Visibility {
         let of = |gaps: &[Gap]| {
             let contrasts = gaps.iter().map(|gap| reading.contrast(gap).unwrap_or(0.0));
@@ -75,7 +75,7 @@ impl Reading<'_> {
         self.ct_from_device.inverse_transform_point(p).z
     }
 
-    /// Column and row at which a point is seen; pixel centres are whole.
+    /// Column and row at which a point is projected; pixel centres are whole numbers.
     fn pixel(&self, p: &Point3<f64>) -> Vector2<f64> {
         let p = self.ct_from_device.inverse_transform_point(p);
         let first = self.detector.pixel_centre_mm(0);
@@ -83,7 +83,7 @@ impl Reading<'_> {
         (at.xy() - first) / self.detector.pixel_mm
     }
 
-    /// Reading and standard error between four pixels; `None` off the detector and where nothing was read.
+    /// Interpolated reading and standard error; `None` off the detector and where nothing was read.
     fn at(&self, pixel: Vector2<f64>) -> Option<(f64, f64)> {
         let [x, y] = [pixel.x.floor(), pixel.y.floor()];
         let (columns, rows) = (self.detector.columns as usize, self.detector.rows as usize);

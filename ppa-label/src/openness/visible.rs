@@ -5,11 +5,11 @@ use super::exposure::Exposure;
 use super::joint_space::{FREE_CHORDS_MM, JointSpace, SeenGap};
 use super::rays::{PIXEL_MM, Ray, Window, middles};
 
-/// A ray that runs through a gap for less than this only grazes its rim, mm.
+/// Shortest path of a ray through a gap, mm: shorter ones only graze its rim.
 const LEAST_PATH_MM: f64 = 3.0;
-/// How far above and below the superior gutter its margins are looked for, mm.
+/// Search range for the margins above and below the superior gutter, mm.
 const MARGIN_MM: f64 = 6.0;
-/// Columns and rows in which the superior gutter is looked at, mm.
+/// Column and row spacing of the samples of the superior gutter, mm.
 const COLUMN_MM: f64 = 1.0;
 const ROW_MM: f64 = 0.5;
 impl JointSpace {

@@ -1,4 +1,4 @@
-//! The grades of one reader, kept in a file while they grade.
+//! The grades of one reader, saved to a file during grading.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,22 +12,22 @@ use super::import_error::ImportError;
 use super::reader_case::ReaderCase;
 use crate::table::write_table;
 
-/// Why a grade is not taken, or the grades so far cannot be read.
+/// Why a grade is rejected, or the existing grades cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GradeSheetError {
-    /// A name that gives no file name, or that spreadsheet programs would run.
+    /// A name without a letter or digit, or one that spreadsheet programs would run as a formula.
     #[error(
         "the reader's name is {0:?}; it needs a letter or a digit and must not begin with = + - or @"
     )]
     Reader(String),
-    /// Off the scale.
+    /// A grade off the scale.
     #[error("a grade is {0}, expected 1, 1.5, 2, 2.5 or 3")]
     Grade(f64),
-    /// A picture that is not of the key.
+    /// A picture that is not in the key.
     #[error("{0} is not a picture in the key")]
     Unknown(String),
-    /// The file is another reader's.
+    /// The file belongs to another reader.
     #[error("{} holds grades of {found}, expected those of {expected}", path.display())]
     OtherReader {
         /// The file.
@@ -55,8 +55,8 @@ pub enum GradeSheetError {
 
 /// The grades that one reader has given to the pictures of a key so far.
 ///
-/// They lie in `grades_NAME.csv` of the folder for readers. Name and columns are those of the file that the
-/// [`grading_page`](super::grading_page) saves, if it shows all pictures; [`import_grades`](super::import_grades) takes the file at any time.
+/// They are stored in `grades_NAME.csv` in the folder for readers. Name and columns are those of the file saved by a
+/// [`grading_page`](super::grading_page) with all pictures; [`import_grades`](super::import_grades) accepts the file at any time.
 #[derive(Debug)]
 pub struct GradeSheet<'a> {
     shown: &'a [ReaderCase],
@@ -77,10 +77,10 @@ struct Row<'a> {
 }
 
 impl<'a> GradeSheet<'a> {
-    /// The grades of `reader` in a folder for readers; none if there is no file yet.
+    /// Opens the grades of `reader` in a folder for readers; none if there is no file yet.
     ///
     /// # Errors
-    /// [`GradeSheetError`] for a name that cannot be one, and a file that holds anything but grades of this reader for pictures of
+    /// [`GradeSheetError`] for an invalid name, and a file that contains anything but grades of this reader for pictures in
     /// the key.
     pub fn open(
         folder: &Path,
@@ -136,7 +136,7 @@ impl<'a> GradeSheet<'a> {
         Ok(sheet)
     }
 
-    /// The files of all readers in a folder, by name.
+    /// The files of all readers in a folder, sorted by name.
     ///
     /// # Errors
     /// [`FileError`] when the folder cannot be read.
@@ -158,7 +158,7 @@ impl<'a> GradeSheet<'a> {
         self.shown.iter().any(|case| case.name == image)
     }
 
-    /// The file.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -168,11 +168,11 @@ impl<'a> GradeSheet<'a> {
         &self.grades
     }
 
-    /// Gives a picture a grade, in place of an earlier one, and writes the file, in the order of the key.
+    /// Sets the grade of a picture, replacing an earlier one, and writes the file in the order of the key.
     ///
     /// # Errors
-    /// [`GradeSheetError`] for a picture that is not of the key, a grade off the scale, and a file that cannot be written; the file is
-    /// as before then.
+    /// [`GradeSheetError`] for a picture that is not in the key, a grade off the scale, and a file that cannot be written; the file is
+    /// then unchanged.
     pub fn give(&mut self, image: &str, grade: f64) -> Result<(), GradeSheetError> {
         if !self.shows(image) {
             return Err(GradeSheetError::Unknown(image.to_owned()));
@@ -197,7 +197,7 @@ impl<'a> GradeSheet<'a> {
     }
 }
 
-/// `grades_NAME.csv`, with an underscore in place of all that are neither letters nor digits, as in `page.html`.
+/// `grades_NAME.csv`, with one underscore for each run of characters that are neither letters nor digits, as in `page.html`.
 fn file_name(reader: &str) -> String {
     let mut name = "grades_".to_owned();
     let mut replaced = false;
@@ -279,7 +279,7 @@ mod tests {
                 "{name:?}"
             );
         }
-        // One file name for both.
+        // Both names give the same file name.
         open("anna m").unwrap().give("a", 1.0).unwrap();
         assert!(matches!(
             open("anna.m"),

@@ -1,4 +1,4 @@
-//! Grades by image and reader, from tables that may name images in any way.
+//! Grades by image and reader, from tables with any image names.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,18 +12,18 @@ use crate::table::{TableError, read_table};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GradeTablesError {
-    /// A file is no table of grades.
+    /// A file is not a table of grades.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// A row that is no grade of a reader.
+    /// An invalid row.
     #[error("{}", path.display())]
     Row {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         source: GradeRowError,
     },
-    /// More than a grade and its repeat.
+    /// A third grade of an image, more than a grade and its repeat.
     #[error("{}: {reader} grades {image} a third time, expected once or twice", path.display())]
     ThirdTime {
         /// The file.
@@ -35,11 +35,11 @@ pub enum GradeTablesError {
     },
 }
 
-/// Why a row is no grade of a reader.
+/// Why a row is not a grade of a reader.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GradeRowError {
-    /// Off the scale.
+    /// A grade off the scale.
     #[error("{reader} grades {image} as {grade}, expected 1, 1.5, 2, 2.5 or 3")]
     Grade {
         /// The reader.
@@ -49,15 +49,15 @@ pub enum GradeRowError {
         /// The grade.
         grade: f64,
     },
-    /// A reader's name that spreadsheet programs would run.
+    /// A reader's name that spreadsheet programs would run as a formula.
     #[error("the reader's name is {0:?}, which spreadsheets interpret as a formula")]
     Formula(String),
 }
 
-/// For each image by name, the first grade of each reader by name, and the second where there is one.
+/// For each image by name, the first grade of each reader by name, and the second, if any.
 pub type GradesByImage = BTreeMap<String, BTreeMap<String, (f64, Option<f64>)>>;
 
-/// The grades of images, first and second, by reader.
+/// Reads the first and second grades of images by reader.
 ///
 /// `files` are tables with the columns image, reader, grade.
 ///

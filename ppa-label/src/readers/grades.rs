@@ -11,21 +11,21 @@ use super::import_error::ImportError;
 use super::reader_case::ReaderCase;
 use crate::table::read_table;
 
-/// What a reader says of a radiograph; a row of `grades.csv`.
+/// A reader's grade of a radiograph; a row of `grades.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Grade {
-    /// The name of a reader case, or the radiograph itself, from the dataset's root.
+    /// The name of a reader case, or the path of the radiograph from the dataset's root.
     pub image: String,
-    /// Who graded it.
+    /// The reader who gave it.
     pub reader: String,
     /// From 1 (ideal) to 3 (inadequate) in half steps.
     pub grade: f64,
-    /// SHA-256 of the radiograph as it was graded; may be missing from what readers hand in.
+    /// SHA-256 of the radiograph as it was graded; may be missing in readers' files.
     #[serde(default)]
     pub sha256: Option<String>,
 }
 
-/// A grade with the file that holds it and the place of its picture among those shown.
+/// A grade with its file and the position of its picture among those shown.
 pub(super) struct Given<'a> {
     pub grade: Grade,
     file: &'a Path,
@@ -39,7 +39,7 @@ impl Given<'_> {
         self.place < usize::MAX
     }
 
-    /// As it is kept: what was shown is the radiograph, and which bytes it had.
+    /// The grade as stored: it names the radiograph and its hash.
     pub fn by_radiograph(&self) -> Grade {
         Grade {
             image: self.radiograph.file.clone(),
@@ -49,10 +49,10 @@ impl Given<'_> {
     }
 }
 
-/// What pictures may be graded.
+/// The pictures that may be graded.
 pub(super) struct Pictures<'a> {
     radiographs: HashMap<&'a str, &'a FileRow>,
-    /// By name: place among those shown, and radiograph.
+    /// By name: position among those shown, and radiograph.
     shown: HashMap<&'a str, (usize, &'a FileRow)>,
 }
 
@@ -77,7 +77,7 @@ impl<'a> Pictures<'a> {
         })
     }
 
-    /// The grades of several files: by reader, for each in the order of the reader cases.
+    /// The grades of several files, sorted by reader and the order of the reader cases.
     pub fn all_of<'f>(&self, files: &'f [PathBuf]) -> Result<Vec<Given<'f>>, ImportError>
     where
         'a: 'f,
@@ -102,7 +102,7 @@ impl<'a> Pictures<'a> {
                 .or_insert((0, given));
             *times += 1;
             let again = given.by_name() && !names.insert((reader, given.grade.image.as_str()));
-            // The pages of one export show a picture and its repeat, each saved to a file of its own.
+            // The pages of one export show a picture and its repeat, each saved to its own file.
             let elsewhere = first.file != given.file && !(first.by_name() && given.by_name());
             if again || *times > 2 || elsewhere {
                 return Err(ImportError::Twice {
@@ -151,15 +151,15 @@ impl<'a> Pictures<'a> {
     }
 }
 
-/// Whether a grade lies between 1 (ideal) and 3 (inadequate) in half steps.
+/// Whether a grade is from 1 (ideal) to 3 (inadequate) in half steps.
 pub(super) fn is_on_scale(grade: f64) -> bool {
     (1.0..=3.0).contains(&grade) && (2.0 * grade).fract() == 0.0
 }
 
-/// Refuses a key that does not belong to the radiographs of a dataset.
+/// Checks that a key belongs to the radiographs of a dataset.
 ///
 /// # Errors
-/// [`ImportError::Changed`] naming the first radiograph that the dataset does not have, or has with other bytes.
+/// [`ImportError::Changed`] naming the first radiograph that is missing in the dataset or has another hash.
 pub fn check_key(manifest: &Manifest, shown: &[ReaderCase]) -> Result<(), ImportError> {
     Pictures::of(manifest, shown).map(|_| ())
 }

@@ -1,4 +1,4 @@
-//! From readers' files to `grades.csv` and `labels.json` of a dataset.
+//! Import of readers' files to `grades.csv` and `labels.json` of a dataset.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -15,19 +15,19 @@ use super::import_error::ImportError;
 use super::reader_case::ReaderCase;
 use crate::table::write_table;
 
-/// All grades of a dataset, as they were given.
+/// All grades of a dataset as given.
 const GRADES_FILE: &str = "grades.csv";
 
-/// What [`import_grades`] did.
+/// Summary of [`import_grades`].
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Imported {
     /// Readers.
     pub readers: usize,
-    /// Radiographs that have a label now.
+    /// Radiographs that now have a readers' label.
     pub labelled: usize,
-    /// Second grades of a radiograph by one reader: kept, but without influence on the label.
+    /// Second grades of a radiograph by one reader: kept, but they do not affect the label.
     pub repeats: usize,
-    /// Computed labels in whose place readers' stand in `labels.json`; they stay in `labels.computed.json`.
+    /// Computed labels replaced by readers' in `labels.json`; they are kept in `labels.computed.json`.
     pub replaced_computed: usize,
     /// Radiographs of the graded limbs that no reader graded and that keep their computed label.
     pub kept_computed: usize,
@@ -35,17 +35,17 @@ pub struct Imported {
     pub without_label: usize,
 }
 
-/// Makes the labels of a dataset from readers' grades: mean and standard deviation (ddof 0) over the readers' first grades.
+/// Computes the labels of a dataset from readers' grades: mean and standard deviation (ddof 0) over the readers' first grades.
 ///
-/// `files` are tables with the columns image, reader, grade, where image is a name of the key `shown` or a radiograph
-/// of the dataset. All grades are kept in `grades.csv` with the hash of their radiograph, so that further ones can be added by
-/// giving that file as well. Readers' labels take the place of computed ones, which stay in `labels.computed.json`; radiographs that no
-/// reader graded keep their computed label.
+/// `files` are tables with the columns image, reader, grade, where image is a name in the key `shown` or a radiograph
+/// of the dataset. All grades are kept in `grades.csv` with the hash of their radiograph, so that more can be added later by
+/// giving that file as well. Readers' labels replace computed ones, which are kept in `labels.computed.json`; radiographs without a
+/// readers' grade keep their computed label.
 ///
 /// # Errors
 /// [`ImportError`], before anything is written: no grades, grades off the scale, unknown pictures, radiographs that changed since
-/// the key was made or the grades were imported, two grades of one picture, files without the grades that are there, and labels
-/// of readers whose grades are not there.
+/// the key was made or the grades were imported, two grades of one picture, files that lack existing grades, and existing labels
+/// of readers without their grades.
 pub fn import_grades(
     manifest: &Manifest,
     shown: &[ReaderCase],
@@ -81,7 +81,7 @@ pub fn import_grades(
         }
         let file = LabelFile::new(LabelSource::Readers, rows.iter().copied())?;
         let file = file.of_radiographs(manifest, limb);
-        // Computed labels had no file of their own in earlier versions.
+        // Earlier versions stored no separate file of computed labels.
         let (computed, has_file) = match LabelFile::read_computed(root, limb)? {
             Some(computed) => (computed, true),
             None => (before.computed(), false),
@@ -102,7 +102,7 @@ pub fn import_grades(
     }
     done.repeats = given.len() - firsts(&given).count();
 
-    // Grades last: an import that was stopped finds the former grades, and labels that follow from those or from its own.
+    // Grades are written last: an interrupted import leaves the former grades, and labels that follow from them or from the new ones.
     let mut written = Vec::new();
     for (limb, labels, computed) in labels {
         if let Some(computed) = computed {
@@ -147,7 +147,7 @@ fn label_rows(given: &[Given]) -> BTreeMap<LimbId, Vec<LabelRow>> {
         .collect()
 }
 
-/// Refuses to write over grades that are not among those given, each as often as it is there.
+/// Rejects an import that would lose existing grades; each must be given as often as it exists.
 fn refuse_loss(path: &Path, before: &[Given], given: &[Given]) -> Result<(), ImportError> {
     let key = |given: &Given| {
         let half_steps = (2.0 * given.grade.grade) as u32;

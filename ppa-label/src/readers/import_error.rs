@@ -7,20 +7,20 @@ use ppa_dataset::labels::{LabelError, LabelFileError};
 
 use crate::table::TableError;
 
-/// Why grades do not become labels; nothing was written then.
+/// Why readers' grades cannot become labels; nothing was written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
     /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file of grades is none.
+    /// A file is not a table of grades.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// No grade in any file.
+    /// No file contains a grade.
     #[error("there are no grades to import")]
     Empty,
-    /// Off the scale.
+    /// A grade off the scale.
     #[error("{}: {reader} grades {image} as {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
     Grade {
         /// The file.
@@ -32,7 +32,7 @@ pub enum ImportError {
         /// The grade.
         grade: f64,
     },
-    /// A reader's name that spreadsheet programs would run.
+    /// A reader's name that spreadsheet programs would run as a formula.
     #[error("{}: the reader's name is {reader:?}, which spreadsheets interpret as a formula; expected a name that does not begin with = + - @, a tab or a carriage return", path.display())]
     Formula {
         /// The file.
@@ -40,7 +40,7 @@ pub enum ImportError {
         /// The name.
         reader: String,
     },
-    /// A picture that neither key nor dataset know.
+    /// A picture that is neither in the key nor in the dataset.
     #[error("{}: {image} is neither a picture in the key nor a radiograph in the dataset", path.display())]
     Unknown {
         /// The file.
@@ -71,7 +71,7 @@ pub enum ImportError {
         /// Hash in the manifest.
         expected: String,
     },
-    /// One picture graded twice, a radiograph a third time, or in two files.
+    /// A picture graded twice, a radiograph graded a third time or in two files.
     #[error("{reader} grades {image} in {} and again in {}", first.display(), second.display())]
     Twice {
         /// The reader.
@@ -80,10 +80,10 @@ pub enum ImportError {
         image: String,
         /// A file.
         first: PathBuf,
-        /// Another one, or the same.
+        /// Another file, or the same one.
         second: PathBuf,
     },
-    /// Grades that are there would be lost.
+    /// Existing grades would be lost.
     #[error(
         "{} holds {reader}'s grade {grade} of {image}, but none of the given files does: give the missing file as well or, \
          if the reader has changed the grade, move this one away and give the files of all readers",
@@ -99,13 +99,13 @@ pub enum ImportError {
         /// The grade.
         grade: f64,
     },
-    /// Labels of readers that are there would be lost.
+    /// Existing labels of readers would be lost.
     #[error(
         "{} holds readers' labels that do not follow from grades.csv; move it away or give their grades before other labels replace them",
         .0.display()
     )]
     OtherLabels(PathBuf),
-    /// Labels that are there are none.
+    /// The existing labels are invalid.
     #[error(transparent)]
     Labels(#[from] LabelFileError),
     /// A label off the grid.

@@ -1,4 +1,4 @@
-//! Labels by readers: the cases they see, and their grades.
+//! Labels by readers: the cases shown to them, and their grades.
 
 mod grade_sheet;
 mod grade_tables;

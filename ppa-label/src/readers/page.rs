@@ -12,14 +12,14 @@ use sha2::{Digest, Sha256};
 
 use super::reader_case::ReaderCase;
 
-/// Pictures on one page: radiographs of 448 x 448 pixels make about 30 MB, which any browser takes.
+/// Pictures on one page: radiographs of 448 x 448 pixels give about 30 MB, which any browser can open.
 pub const PICTURES_PER_PAGE: usize = 200;
 
 /// Why a picture or a page could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
-    /// No radiograph to show.
+    /// No radiograph to grade.
     #[error("there is no radiograph to grade")]
     Empty,
     /// A radiograph cannot be read.
@@ -55,17 +55,17 @@ struct Picture<'a> {
     png: String,
 }
 
-/// Which of several pages.
+/// Number of one of several pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PageNumber {
-    /// Counted from 1.
+    /// The page, counted from 1.
     pub page: usize,
-    /// Their number.
+    /// Number of pages.
     pub of: usize,
 }
 
-/// The picture of a reader case as an 8-bit PNG. All pictures have one window: black is 0 and white 65535 of the 16-bit
-/// radiographs. Nothing but the pixels gets into it.
+/// The picture of a reader case as an 8-bit PNG. All pictures have the same window: black is 0 and white 65535 of the 16-bit
+/// radiographs. The file contains only the pixels.
 ///
 /// # Errors
 /// [`PageError`] naming a radiograph that cannot be read or has changed.
@@ -94,13 +94,13 @@ pub fn reader_picture(root: &Path, reader_case: &ReaderCase) -> Result<Vec<u8>, 
     Ok(png.into_inner())
 }
 
-/// A page of HTML that shows the radiographs one by one, takes a grade of each by key, and saves them as CSV with the
+/// An HTML page that shows the radiographs one by one, takes a grade of each by key, and saves them as CSV with the
 /// columns image (the name of the reader case), reader and grade.
 ///
-/// Nothing but names and pictures, those of [`reader_picture`], gets into the page.
+/// The page contains only names and the pictures of [`reader_picture`].
 ///
 /// # Errors
-/// [`PageError`] without radiographs, and naming one that cannot be read or has changed.
+/// [`PageError`] if there are no radiographs, or naming one that cannot be read or has changed.
 pub fn grading_page(
     root: &Path,
     shown: &[ReaderCase],
@@ -128,6 +128,6 @@ pub fn grading_page(
 fn format_picture(name: &str, png: &[u8]) -> String {
     let png = STANDARD.encode(png);
     let json = serde_json::to_string(&Picture { name, png }).expect("texts are JSON");
-    // So that no name ends the script that holds it.
+    // A name must not end the script that contains it.
     json.replace('<', "\\u003c")
 }

@@ -13,23 +13,23 @@ use crate::table::{TableError, read_table, write_table};
 /// One picture that a reader grades; a row of the key.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReaderCase {
-    /// The name readers see: ten digits that mean nothing.
+    /// The name readers see: ten hexadecimal digits without a meaning.
     pub name: String,
-    /// The radiograph, from the dataset's root.
+    /// Path of the radiograph from the dataset's root.
     pub image: String,
     /// SHA-256 of the radiograph's file.
     pub sha256: String,
 }
 
-/// Share of the radiographs that are shown twice, at least one.
+/// Share of the radiographs that are shown twice, at least one radiograph.
 const REPEATED: f64 = 0.1;
 
 impl ReaderCase {
-    /// All radiographs of a dataset at multiples of `every_deg` degrees in random order, and a tenth of them, rounded up,
-    /// once more in the second half, where the reader has forgotten them.
+    /// Returns all radiographs of a dataset at multiples of `every_deg` degrees in random order, and a tenth of them, rounded up,
+    /// again in the second half, when the reader has forgotten them.
     ///
-    /// Names and order follow from the seed, and names from the image's bytes too: grades of another export or of
-    /// another dataset find no picture in the key.
+    /// The seed determines names and order, and names also depend on the image's bytes, so grades of another export or
+    /// another dataset do not match any picture in the key.
     pub fn of_dataset(manifest: &Manifest, seed: u64, every_deg: f64) -> Vec<Self> {
         let radiographs = manifest.files.iter().filter(|row| {
             row.kind == FileKind::Radiograph && (row.angle_deg / every_deg).fract() == 0.0
@@ -53,7 +53,7 @@ impl ReaderCase {
             .iter()
             .map(|first| reader_case(&first.image, &first.sha256, 2))
             .collect();
-        // One radiograph alone has no second half.
+        // A single radiograph has no second half.
         let half = shown.len().div_ceil(2);
         shown.extend(again);
         shown[half..].sort_by(|a, b| a.name.cmp(&b.name));

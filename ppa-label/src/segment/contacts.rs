@@ -1,4 +1,4 @@
-//! Where bones touch.
+//! Contacts between bones.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::AnkleBone;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contact {
     pub area_mm2: f64,
-    /// Sum of places in `ct` times area.
+    /// Sum of position in `ct` times area.
     moment: Vector3<f64>,
 }
 
@@ -22,7 +22,7 @@ impl Contact {
     }
 }
 
-/// Contacts by the two bones, the smaller number first.
+/// Contacts by pair of bones, the smaller number first.
 pub(super) struct Contacts(BTreeMap<[u16; 2], Contact>);
 
 impl Contacts {
@@ -60,8 +60,8 @@ impl Contacts {
         sum.moment += more.moment;
     }
 
-    /// Bones without a name that touch another over more than `most_mm2` were part of it, or were not separated from it: they
-    /// join the one that they touch most. Large contacts first.
+    /// Merges each unnamed bone that touches another over more than `most_mm2`, since it was part of it or not separated from it, into
+    /// the bone that it touches most. Large contacts first.
     pub fn merged(mut self, bones: &mut [Option<u16>], most_mm2: f64) -> Self {
         let mut joins = BTreeMap::new();
         let named = AnkleBone::ALL.len() as u16;

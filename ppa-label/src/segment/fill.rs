@@ -1,6 +1,6 @@
 //! Voxels connected by faces.
 
-/// What can be reached from `starts` through `free` voxels.
+/// Voxels that can be reached from `starts` through `free` voxels.
 pub(super) fn flooded(
     size: [usize; 3],
     starts: impl Iterator<Item = usize>,
@@ -20,7 +20,7 @@ pub(super) fn flooded(
     reached
 }
 
-/// The voxels on the other side of the faces of a voxel.
+/// The voxels that share a face with a voxel.
 pub(super) fn neighbours(size: [usize; 3], at: usize) -> impl Iterator<Item = usize> {
     let [nx, ny, nz] = size;
     let strides = [1, nx, nx * ny];

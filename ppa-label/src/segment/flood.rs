@@ -7,7 +7,7 @@ use super::fill::neighbours;
 use super::solid::Density;
 use crate::AnkleBone;
 
-/// Which voxels begin which bone: 0 to 2 are those of [`AnkleBone`], any further have no name.
+/// Seed voxels of each bone: 0 to 2 are those of [`AnkleBone`], others have no name.
 pub(super) struct Seeds {
     size: [usize; 3],
     bones: usize,
@@ -29,7 +29,7 @@ impl Seeds {
         }
     }
 
-    /// Plants a bone of its own in every piece of at least `least` voxels that holds no seed yet.
+    /// Plants a new bone in every piece of at least `least` voxels that contains no seed yet.
     pub fn plant_others(&mut self, solid: &[bool], least: f64) {
         for piece in self.pieces(solid) {
             let free = piece.iter().all(|&at| self.of[at].is_none());
@@ -40,7 +40,7 @@ impl Seeds {
         }
     }
 
-    /// What hangs together through faces, in order of the first voxel.
+    /// Pieces connected through faces, in order of the first voxel.
     pub fn pieces(&self, solid: &[bool]) -> Vec<Vec<usize>> {
         let mut seen = vec![false; solid.len()];
         let mut pieces = Vec::new();
@@ -66,11 +66,11 @@ impl Seeds {
     }
 }
 
-/// Every solid voxel that hangs together with a seed goes to the one from which the densest way leads to it, where a way is
-/// as dense as its least dense voxel: a watershed of the density (Meyer, Signal Processing 38, 1994, 113).
+/// Assigns every solid voxel connected to a seed to the one with the densest path to it, where the density of a path is that of
+/// its least dense voxel: a watershed of the density (Meyer, Signal Processing 38, 1994, 113).
 pub(super) fn flood(density: &Density, solid: &[bool], seeds: Seeds) -> Vec<Option<u16>> {
     let mut bones = seeds.of;
-    // Shares are positive, so that their bits are in order; of equals the first voxel is first.
+    // Shares are positive, so their bits are in the same order; of equal ones, the first voxel comes first.
     let key = |share: f32, at: usize| (share.to_bits(), Reverse(at));
     let mut front: BinaryHeap<_> = (0..bones.len())
         .filter(|&at| bones[at].is_some())

@@ -1,9 +1,9 @@
 //! Separation of the bones of an ankle in an unlabelled CT.
 //!
-//! Bone is what is at least half as dense as the densest place nearby ([`solid`]), so that a joint space counts as one
-//! even where blur and partial volume fill it up to the density of spongy bone. Where bones are still connected, a watershed between shaft, talus and
-//! whatever else separates by itself divides them at the least dense place ([`flood`]). Bones that touch over a larger area than a bridge of noise
-//! were not separated: tibia, fibula and talus are then refused, with the place.
+//! Bone is what is at least half as dense as the densest place nearby ([`solid`]), so that a joint space is detected even
+//! if blur and partial volume fill it up to the density of spongy bone. Bones that are still connected are divided at the least dense
+//! place by a watershed between shafts, talus and all other pieces that separate by themselves ([`flood`]). Bones that touch over a
+//! larger area than a bridge of noise were not separated: for tibia, fibula and talus this is an error that states the place.
 
 mod contacts;
 mod fill;
@@ -26,24 +26,24 @@ use super::openness::{AnkleBone, box_around};
 pub struct SegmentedBones {
     /// The lattice of the scan within 60 mm of the joint.
     pub grid: Grid,
-    /// i fastest, 0 for no bone: tibia, fibula and talus by [`BoneNumbers::default`], others from 5, each with its own number
-    /// (from the 251st on they share 255).
+    /// One number per voxel, i fastest, 0 for no bone: tibia, fibula and talus by [`BoneNumbers::default`], others from 5, each with its
+    /// own number (from the 251st on they share 255).
     pub labels: Vec<u8>,
 }
 
-/// Why bones of an ankle were not separated.
+/// Why the bones of an ankle could not be separated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SegmentError {
-    /// No bone where one must be.
+    /// No bone was found where one is expected.
     #[error("no {bone} found {where_}")]
     NoBone {
         /// Its name.
         bone: &'static str,
-        /// Where it was looked for.
+        /// Where it was expected.
         where_: &'static str,
     },
-    /// Two bones are one in the scan.
+    /// Two bones are connected in the scan.
     #[error(
         "{} and {} are not separated: they touch over {area_mm2:.0} mm² around {:.1}, {:.1}, {:.1} mm (LPS), expected at most \
          {MOST_CONTACT_MM2} mm²; voxels are {:.2} x {:.2} x {:.2} mm", bones[0], bones[1], at[0], at[1], at[2],
@@ -52,40 +52,40 @@ pub enum SegmentError {
     Touching {
         /// Their names.
         bones: [&'static str; 2],
-        /// How much of them touches.
+        /// Area of their contact.
         area_mm2: f64,
-        /// The middle of that, `ct`.
+        /// The middle of the contact, `ct`.
         at: [f64; 3],
         /// Sides of a voxel.
         spacing_mm: [f64; 3],
     },
 }
 
-/// Bones that were separated touch at most where noise bridges their gap, mm². A gutter measures 200 mm² and more.
+/// Largest contact of separated bones, where noise bridges their gap, mm². A gutter measures 200 mm² and more.
 const MOST_CONTACT_MM2: f64 = 30.0;
-/// Where the shafts of tibia and fibula are looked for, mm above the joint.
+/// Range in which the shafts of tibia and fibula are searched, mm above the joint.
 const SHAFT_MM: [f64; 2] = [30.0, 60.0];
-/// A fibula is at least so large beside the tibia.
+/// Smallest size of a fibula relative to the tibia.
 const LEAST_FIBULA: f64 = 0.03;
-/// Where the trochlea is looked for: mm above the joint, and from the axis.
+/// Range in which the trochlea is searched: mm above the joint, and from the axis.
 const TROCHLEA_MM: [f64; 2] = [-12.0, -2.0];
 const TROCHLEA_RADIUS_MM: f64 = 6.0;
-/// Densities, over that of the densest place nearby, at which other bones are looked for: half is the surface.
+/// Densities, relative to the densest place nearby, at which other bones are searched: half is the surface.
 const SHARES: [f32; 3] = [0.5, 0.6, 0.7];
-/// A piece that only separates at a higher share is a bone from this size on, mm³: the smallest of the tarsus have twice as much.
+/// Smallest bone that separates only at a higher share, mm³: the smallest of the tarsus are twice as large.
 const LEAST_BONE_MM3: f64 = 1000.0;
-/// What hangs together with nothing and is smaller is noise, mm³: a ball of 2.7 mm.
+/// Smallest isolated piece that is not noise, mm³: a ball of 2.7 mm.
 const LEAST_PIECE_MM3: f64 = 10.0;
 /// First number of the other bones.
 const FIRST_OTHER: usize = 5;
 
 /// Separates the bones within 60 mm of an ankle.
 ///
-/// `limb` says of each voxel of the scan whether it belongs to the limb; `ct_from_patient` has the joint at its origin and z
+/// `limb` states for each voxel of the scan whether it belongs to the limb; `ct_from_patient` has the joint at its origin and z
 /// along the limb towards proximal.
 ///
 /// # Errors
-/// [`SegmentError`] when tibia, fibula or talus is not found, or two of them touch, with the place.
+/// [`SegmentError`] when tibia, fibula or talus is not found, or when two of them touch, with the place.
 pub fn segment_bones(
     volume: &Volume,
     limb: &[bool],
@@ -166,7 +166,7 @@ impl SegmentedBones {
     }
 }
 
-/// Tibia and fibula are the two largest bones of the leg above the ankle.
+/// Seeds tibia and fibula, the two largest bones of the leg above the ankle.
 fn seed_shafts(
     seeds: &mut Seeds,
     solid: &[bool],
@@ -195,7 +195,7 @@ fn within(value: f64, [low, high]: [f64; 2]) -> bool {
     (low..=high).contains(&value)
 }
 
-/// The numbers that stand in files: bones other than the three of the joint in order of their first voxel.
+/// The numbers used in files: bones other than the three of the joint are numbered in order of their first voxel.
 fn numbered(bones: &[Option<u16>]) -> Vec<u8> {
     let numbers = BoneNumbers::default();
     let mut others = HashMap::new();

@@ -7,16 +7,16 @@ use super::fill::flooded;
 
 /// Soft tissue, HU.
 const SOFT_HU: f32 = 50.0;
-/// Less is no bone, HU.
+/// Lower values are not bone, HU.
 const LEAST_HU: f32 = 200.0;
-/// Metal would make the bone beside it count as soft tissue: nothing counts as denser than cortical bone, HU.
+/// Upper limit, the density of cortical bone, HU: otherwise metal would make adjacent bone count as soft tissue.
 const MOST_HU: f32 = 1600.0;
-/// How far the densest place is looked for along each axis, mm: from soft tissue past the surface into the cortex.
+/// Search range for the densest place along each axis, mm: from soft tissue past the surface into the cortex.
 const NEAR_MM: f64 = 2.0;
 
-/// Density of each voxel between soft tissue, 0, and the densest place within 2 mm, 1.
+/// Density of each voxel from 0 (soft tissue) to 1 (the densest place within 2 mm).
 ///
-/// The surface of a bone lies at a half: half-maximum height (Spoor, Zonneveld & Macho, Am J Phys Anthropol 91, 1993, 469).
+/// The surface of a bone is at one half: half-maximum height (Spoor, Zonneveld & Macho, Am J Phys Anthropol 91, 1993, 469).
 pub(super) struct Density {
     pub size: [usize; 3],
     pub share: Vec<f32>,
@@ -48,7 +48,7 @@ impl Density {
         }
     }
 
-    /// Voxels of at least this share, and all that such voxels enclose in a slice across the limb: spongy bone and marrow.
+    /// Voxels of at least this share, and all voxels that they enclose in a slice across the limb: spongy bone and marrow.
     pub fn solid(&self, least: f32) -> Vec<bool> {
         let mut solid: Vec<bool> = self.share.iter().map(|&share| share >= least).collect();
         let strides = [1, self.size[0], self.size[0] * self.size[1]];

@@ -21,7 +21,7 @@ pub struct Icc {
 /// C: consistency, a reader's constant offset does not count. `single`: one reader's grade, `mean`: the mean of all.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IccForms {
-    /// Subjects that every reader graded, which are those used.
+    /// Subjects used: those that every reader graded.
     pub subjects: usize,
     /// Readers.
     pub readers: usize,
@@ -47,12 +47,12 @@ const UPPER: f64 = 0.975;
 ///
 /// # Errors
 /// [`MetricError::TooFew`] if fewer than two subjects were graded by all, [`MetricError::Constant`] if the mean grades
-/// of the subjects are the same, so that there is nothing to correlate.
+/// of the subjects are the same, so that the correlation is undefined.
 pub fn icc(ratings: &Ratings) -> Result<IccForms, MetricError> {
     let rows = ratings.complete_rows();
     at_least_two("subjects graded by every reader", rows.len())?;
     let squares = MeanSquares::of(&rows);
-    // Equal means differ by rounding.
+    // Equal means can differ by rounding.
     if squares.subjects <= 1e-12 * squares.within {
         return Err(MetricError::Constant {
             what: "mean grades of subjects",
@@ -77,7 +77,7 @@ pub fn icc(ratings: &Ratings) -> Result<IccForms, MetricError> {
 }
 
 impl Icc {
-    /// Spearman and Brown: of the mean of k readers; it carries every form's interval over as well.
+    /// Spearman-Brown formula for the mean of k readers; it also converts the interval of every form.
     fn of_mean(self, k: f64) -> Self {
         let stepped_up = |single: f64| k * single / (1.0 + (k - 1.0) * single);
         Self {
@@ -97,7 +97,7 @@ struct MeanSquares {
     subjects: f64,
     /// Between readers, k − 1.
     readers: f64,
-    /// What neither explains, (n − 1)(k − 1).
+    /// Residual, (n − 1)(k − 1).
     residual: f64,
     /// Within subjects, n (k − 1).
     within: f64,
@@ -139,7 +139,7 @@ impl MeanSquares {
     }
 
     /// (MS_R − MS) / (MS_R + (k − 1) MS), whose interval follows from the F distribution of MS_R / MS; `freedom` is that
-    /// of MS. Written without the quotient, which is infinite where readers agree perfectly.
+    /// of MS. Written without the quotient, which is infinite if readers agree perfectly.
     fn ratio_form(&self, other: f64, freedom: f64) -> Icc {
         let of =
             |subjects: f64, other: f64| (subjects - other) / (subjects + (self.k - 1.0) * other);
@@ -172,7 +172,7 @@ impl MeanSquares {
                 high: value,
             };
         }
-        // a and b of the source times n (1 − ICC), which cancels in their ratio.
+        // a and b of the source, times n (1 − ICC), which cancels in their ratio.
         let a = k * value;
         let b = n * (1.0 - value) + k * value * (n - 1.0);
         let freedom = (a * readers + b * residual).powi(2)
@@ -305,7 +305,7 @@ mod tests {
             equal.to_string(),
             "all 3 mean grades of subjects are 2: a correlation needs two different values"
         );
-        // Readers disagree on every subject, and the means are the same: no interval of ICC(A,1) exists.
+        // Readers disagree on every subject, and the means are the same: ICC(A,1) has no interval.
         let turned = [[1.0, 2.0, 3.0], [2.0, 3.0, 1.0], [3.0, 1.0, 2.0]];
         let turned = turned.map(|row| row.map(Some).to_vec()).to_vec();
         assert!(matches!(of(turned), Err(MetricError::Constant { .. })));

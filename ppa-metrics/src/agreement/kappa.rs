@@ -7,14 +7,14 @@ use crate::error::{MetricError, check_pair};
 pub enum KappaWeights {
     /// Any disagreement counts 1.
     Equal,
-    /// The difference of the grades.
+    /// The absolute difference of the grades.
     Linear,
-    /// Its square.
+    /// The squared difference.
     Quadratic,
 }
 
 /// Cohen's κ, 1 − observed/expected disagreement, expected from each reader's own frequencies (J. Cohen, Psychol.
-/// Bull. 70, 1968). Grades weigh by their values, so that half steps weigh half of whole ones.
+/// Bull. 70, 1968). Differences are those of the grades' values, so a half step has half the difference of a whole one.
 ///
 /// # Errors
 /// [`MetricError::Constant`] if both readers gave one and the same grade throughout; empty, unequal or non-finite input.
@@ -51,7 +51,7 @@ pub fn weighted_kappa(
     Ok(1.0 - count * observed / expected)
 }
 
-/// Each grade with how often it was given, ascending.
+/// Each grade with its number of occurrences, ascending.
 fn frequencies(grades: &[f64]) -> Vec<(f64, f64)> {
     let mut sorted = grades.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -91,7 +91,7 @@ mod tests {
             weighted_kappa(&[2.0, 2.0], &[2.0, 2.0], KappaWeights::Linear),
             Err(MetricError::Constant { .. })
         ));
-        // One reader alone being constant leaves κ at 0: no better than chance.
+        // If only one reader is constant, κ is 0: no better than chance.
         let chance = weighted_kappa(&[1.0, 2.0], &[2.0, 2.0], KappaWeights::Linear);
         assert_eq!(chance, Ok(0.0));
     }

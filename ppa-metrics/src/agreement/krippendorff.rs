@@ -3,12 +3,12 @@
 use super::ratings::Ratings;
 use crate::error::MetricError;
 
-/// How far two grades lie apart.
+/// Distance between two grades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measurement {
     /// Equal or not.
     Nominal,
-    /// By the number of grades given between them.
+    /// By the number of given grades between them.
     Ordinal,
     /// By their difference.
     Interval,
@@ -16,8 +16,8 @@ pub enum Measurement {
     Ratio,
 }
 
-/// Krippendorff's α, 1 − observed/expected disagreement: 1 is perfect, 0 what chance gives. Missing grades are
-/// allowed; a subject with a single grade says nothing and is left out (K. Krippendorff, Computing Krippendorff's
+/// Krippendorff's α, 1 − observed/expected disagreement: 1 is perfect, 0 is chance level. Missing grades are
+/// allowed; a subject with a single grade is left out (K. Krippendorff, Computing Krippendorff's
 /// Alpha-Reliability, 2011).
 ///
 /// # Errors
@@ -35,7 +35,7 @@ pub fn krippendorff_alpha(ratings: &Ratings, measurement: Measurement) -> Result
     }
     let count = grades.len();
     grades.sort_unstable_by(f64::total_cmp);
-    // −0 and 0 are one grade.
+    // −0 and 0 are the same grade.
     grades.dedup_by(|a, b| a == b);
     if grades.len() == 1 {
         return Err(MetricError::Constant {

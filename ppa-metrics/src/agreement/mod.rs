@@ -1,5 +1,5 @@
 //! Agreement of readers: intraclass correlation, Krippendorff's α, weighted κ, bias of each reader, repeats;
-//! [`agreement_report`] holds them all.
+//! [`agreement_report`] computes them all.
 
 mod icc;
 mod kappa;

@@ -2,7 +2,7 @@
 
 use crate::error::MetricError;
 
-/// Table of grades: subjects (images) × readers, a grade may be missing.
+/// Table of grades: subjects (images) × readers; a grade may be missing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ratings {
     readers: usize,
@@ -10,11 +10,11 @@ pub struct Ratings {
 }
 
 impl Ratings {
-    /// One row per subject with one grade, or none, per reader.
+    /// Builds the table from one row per subject with one grade, or none, per reader.
     ///
     /// # Errors
-    /// [`MetricError::TooFew`] for fewer than two subjects or readers, [`MetricError::Length`] for rows that are not
-    /// equally long, [`MetricError::NotFinite`] for a grade that is infinite or NaN.
+    /// [`MetricError::TooFew`] for fewer than two subjects or readers, [`MetricError::Length`] for rows of different
+    /// lengths, [`MetricError::NotFinite`] for a grade that is infinite or NaN.
     pub fn new(rows: Vec<Vec<Option<f64>>>) -> Result<Self, MetricError> {
         at_least_two("subjects", rows.len())?;
         let readers = rows[0].len();
@@ -60,14 +60,14 @@ impl Ratings {
         self.rows.iter().filter_map(complete).collect()
     }
 
-    /// The grades two readers gave the subjects that both graded.
+    /// The grades that two readers gave to the subjects both graded.
     pub fn common(&self, first: usize, second: usize) -> (Vec<f64>, Vec<f64>) {
         let both = |row: &Vec<Option<f64>>| row[first].zip(row[second]);
         self.rows.iter().filter_map(both).unzip()
     }
 }
 
-/// Refuses fewer than two.
+/// Returns an error for fewer than two.
 pub(super) fn at_least_two(what: &'static str, found: usize) -> Result<(), MetricError> {
     match found {
         0 | 1 => Err(MetricError::TooFew {

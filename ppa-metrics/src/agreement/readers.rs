@@ -1,22 +1,22 @@
-//! Each reader against the others and against themselves, and where readers differ most.
+//! Each reader compared with the others and with themselves, and the images on which readers differ most.
 
 use serde::Serialize;
 
 use super::ratings::Ratings;
 use crate::error::{MetricError, check_pair};
 
-/// How one reader differs from the mean of the others, over the subjects that this reader and another graded.
+/// Difference of one reader from the mean of the others, over the subjects that this reader and another graded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReaderError {
-    /// Those subjects.
+    /// Number of these subjects.
     pub subjects: usize,
-    /// Mean of grade − mean of the others: above 0 for a strict reader, as 3 is inadequate.
+    /// Mean of grade − mean of the others: above 0 for a strict reader, since 3 is inadequate.
     pub bias: f64,
-    /// Mean of |grade − mean of the others|: what a computed label has to beat.
+    /// Mean of |grade − mean of the others|: the error that a computed label has to beat.
     pub mae: f64,
 }
 
-/// One [`ReaderError`] per reader, `None` for one who shares no subject with another.
+/// Returns one [`ReaderError`] per reader, `None` for one who shares no subject with another.
 pub fn reader_errors(ratings: &Ratings) -> Vec<Option<ReaderError>> {
     let of_reader = |reader: usize| {
         let differences: Vec<f64> = ratings
@@ -38,18 +38,18 @@ pub fn reader_errors(ratings: &Ratings) -> Vec<Option<ReaderError>> {
     (0..ratings.readers()).map(of_reader).collect()
 }
 
-/// How a reader agrees with themselves on images shown twice.
+/// Agreement of a reader with themselves on images shown twice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RepeatAgreement {
     /// Images shown twice.
     pub images: usize,
-    /// Share that got the same grade.
+    /// Share of images with the same grade twice.
     pub equal: f64,
     /// Mean of |second − first|.
     pub mae: f64,
 }
 
-/// First and second grade of each repeated image.
+/// Compares first and second grade of each repeated image.
 ///
 /// # Errors
 /// [`MetricError`] for empty, unequal or non-finite input.
@@ -77,7 +77,7 @@ pub struct Disagreement {
     pub std: f64,
 }
 
-/// The subjects with different grades, widest range first, then largest standard deviation, then first row.
+/// The subjects with different grades, by widest range, then largest standard deviation, then first row.
 pub fn disagreements(ratings: &Ratings) -> Vec<Disagreement> {
     let mut found: Vec<Disagreement> = ratings
         .rows()
@@ -131,7 +131,7 @@ mod tests {
             (4, -0.5625, 0.5625)
         );
         let third = errors[2].unwrap();
-        // 2 − 1, 3 − 2.25, 2 − 1.5; the image only this reader graded says nothing
+        // 2 − 1, 3 − 2.25, 2 − 1.5; an image graded only by this reader does not count
         assert_eq!((third.subjects, third.bias), (3, 0.75));
         assert_eq!(errors[3], None);
     }

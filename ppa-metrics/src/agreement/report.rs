@@ -13,13 +13,13 @@ use super::readers::{
 };
 use crate::error::MetricError;
 
-/// How many of the images on which readers differ most are listed.
+/// Number of listed images with the largest disagreement.
 const MOST_DISAGREEMENTS: usize = 10;
 
-/// For each image by name, the first grade of each reader by name, and the second where there is one.
+/// For each image by name, the first grade of each reader by name, and the second, if any.
 pub type GradesByImage = BTreeMap<String, BTreeMap<String, (f64, Option<f64>)>>;
 
-/// Agreement of readers. Second grades of an image count for `against_self` only.
+/// Agreement of readers. Second grades of an image only count for `against_self`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgreementReport {
     /// Images that any reader graded.
@@ -35,11 +35,11 @@ pub struct AgreementReport {
     /// Krippendorff's α of grades on an interval scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alpha_interval: Option<f64>,
-    /// Every two readers.
+    /// All pairs of readers.
     pub pairs: Vec<PairReport>,
     /// At most ten images, widest disagreement first.
     pub largest_disagreements: Vec<ImageDisagreement>,
-    /// What has no value, and why.
+    /// Undefined statistics, and why.
     pub undefined: Vec<String>,
 }
 
@@ -63,7 +63,7 @@ pub struct ReaderReport {
 pub struct PairReport {
     /// Their names.
     pub readers: [String; 2],
-    /// Those images.
+    /// Number of these images.
     pub images: usize,
     /// κ with linear weights.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,11 +82,11 @@ pub struct ImageDisagreement {
     pub lowest: f64,
     /// Worst grade.
     pub highest: f64,
-    /// Standard deviation over the readers, as of [`Disagreement`](super::Disagreement).
+    /// Standard deviation over the readers, as in [`Disagreement`](super::Disagreement).
     pub std: f64,
 }
 
-/// Everything about the agreement of readers; a statistic without a value is named in `undefined`.
+/// Computes all statistics of the agreement of readers; those without a value are named in `undefined`.
 ///
 /// # Errors
 /// [`MetricError`] for fewer than two images or readers, and for grades that are not finite.

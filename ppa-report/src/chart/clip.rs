@@ -1,6 +1,6 @@
 //! Clipping of points and lines to the axes.
 
-/// The nearest point within the axes; the same one if it lies there.
+/// The nearest point within the axes; a point inside is unchanged.
 pub fn point(point: [f64; 2], ranges: [[f64; 2]; 2]) -> [f64; 2] {
     [0, 1].map(|axis| point[axis].clamp(ranges[axis][0], ranges[axis][1]))
 }
@@ -32,7 +32,7 @@ fn segment([a, b]: [[f64; 2]; 2], ranges: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]
     (first <= last).then(|| [at(first), at(last)])
 }
 
-/// The parts of a line through some points that lie within the axes.
+/// The parts of a polyline that are within the axes.
 pub fn lines(points: &[[f64; 2]], ranges: [[f64; 2]; 2]) -> Vec<Vec<[f64; 2]>> {
     let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
     for pair in points.windows(2) {
@@ -68,7 +68,7 @@ mod tests {
         // Through two sides, in both directions.
         assert_eq!(cut([-1.0, 0.5], [3.0, 0.5]), Some([[0.0, 0.5], [2.0, 0.5]]));
         assert_eq!(cut([1.0, 3.0], [1.0, -1.0]), Some([[1.0, 1.0], [1.0, 0.0]]));
-        // Past a corner, beside, and beyond.
+        // Past a corner, to the side, and beyond.
         assert_eq!(cut([-1.0, 0.5], [0.5, 2.0]), None);
         assert_eq!(cut([0.0, 1.5], [2.0, 1.5]), None);
         assert_eq!(cut([3.0, 0.5], [4.0, 0.5]), None);

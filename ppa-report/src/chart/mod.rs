@@ -29,15 +29,15 @@ pub enum Mark {
     Area,
 }
 
-/// Points that belong together.
+/// Points drawn together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What it is.
+    /// Its name in the legend.
     pub name: String,
     /// How it is drawn.
     pub mark: Mark,
-    /// Points. Dots beyond the axes stand at the rim and lines are cut there, which a note below the chart counts; values
-    /// that are not finite are counted as well, drawn nowhere, and interrupt a line.
+    /// Points. Dots beyond the axes are drawn at the rim and lines are cut there; a note below the chart gives their number. Values
+    /// that are not finite are counted as well, not drawn, and interrupt a line.
     pub points: Vec<[f64; 2]>,
     /// Half the height of a band around each point; empty for none.
     pub spread: Vec<f64>,
@@ -61,11 +61,11 @@ impl Series {
 /// A tinted rectangle with a text in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
-    /// Both ends along the axes, x first, within the chart's ranges.
+    /// Ends along both axes, x first, within the chart's ranges.
     pub ranges: [[f64; 2]; 2],
     /// From 0, white, to 1, blue.
     pub share: f64,
-    /// What stands in it.
+    /// Its text.
     pub text: String,
 }
 
@@ -74,15 +74,15 @@ pub struct Tile {
 pub struct Chart {
     /// Columns and rows.
     pub size: [u32; 2],
-    /// Above it; empty for none.
+    /// Title above the chart; empty for none.
     pub title: String,
     /// Names of the axes, x first.
     pub labels: [String; 2],
-    /// Both ends of the axes, x first.
+    /// Ends of both axes, x first.
     pub ranges: [[f64; 2]; 2],
-    /// What is drawn below the series.
+    /// Tiles, drawn below the series.
     pub tiles: Vec<Tile>,
-    /// What is drawn, the last one on top.
+    /// Series, the last one on top.
     pub series: Vec<Series>,
 }
 
@@ -97,7 +97,7 @@ const COLOURS: [RGBColor; 6] = [
 ];
 /// Height of a line of text.
 const LINE: i32 = 18;
-/// Width of a letter in the pixels' font, the wider one.
+/// Width of a letter in the font of the PNG, the wider one.
 const LETTER: i32 = 8;
 const RIGHT: i32 = 16;
 
@@ -117,7 +117,7 @@ fn centred(colour: &RGBColor) -> TextStyle<'_> {
 }
 
 impl Chart {
-    /// The chart as SVG, without fonts of its own.
+    /// The chart as SVG, without embedded fonts.
     pub fn to_svg(&self) -> String {
         let [width, height] = self.size;
         let canvas = self.size.map(|side| side * SCALE as u32);
@@ -132,7 +132,7 @@ impl Chart {
         )
     }
 
-    /// The chart as part of an HTML page, where SVG needs no namespace: the page then names no address at all.
+    /// The chart as part of an HTML page, where SVG needs no namespace, so the page contains no addresses.
     pub(crate) fn to_inline_svg(&self) -> String {
         self.to_svg()
             .replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
@@ -231,7 +231,7 @@ impl Chart {
         (x * SCALE, y * SCALE)
     }
 
-    /// Writes the names of the series in their colours, as many to a line as fit, and returns the height of the lines.
+    /// Writes the names of the series in their colours, as many per line as fit, and returns the height of the lines.
     fn draw_legend<DB: DrawingBackend>(
         &self,
         page: &DrawingArea<DB, Shift>,
@@ -317,7 +317,7 @@ fn draw_tile<DB: DrawingBackend>(axes: &mut Axes<DB>, tile: &Tile) -> Drawn<DB> 
     Ok(())
 }
 
-/// Least and greatest value, never the same: the range of an axis.
+/// Smallest and largest value, always different: the range of an axis.
 pub fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
         [l.min(v), h.max(v)]
@@ -344,7 +344,7 @@ mod tests {
         }
     }
 
-    /// Places of the shapes of a name, by two of their attributes.
+    /// Positions of the shapes of a name, by two of their attributes.
     fn places(svg: &str, shape: &str, attributes: [&str; 2]) -> Vec<[i32; 2]> {
         let lines = svg
             .lines()
@@ -358,7 +358,7 @@ mod tests {
             .collect()
     }
 
-    /// A dot in the middle of the axes is drawn there, in its colour, in both formats; one beyond them at the rim.
+    /// In both formats, a dot in the middle of the axes is drawn there in its colour, and one beyond them at the rim.
     #[test]
     fn points_stand_where_the_axes_say() {
         let points = vec![[1.0, 2.0], [5.0, 2.0], [1.0, f64::NAN], [0.0, 1.0]];
@@ -367,7 +367,7 @@ mod tests {
         let [middle, rim, origin] = places(&svg, "circle", ["cx", "cy"])[..] else {
             panic!("three dots: {svg}")
         };
-        // Places are rounded to whole pixels of the canvas.
+        // Positions are rounded to whole pixels of the canvas.
         assert!((rim[0] + origin[0] - 2 * middle[0]).abs() <= 1, "{svg}");
         assert_eq!(rim[1], middle[1]);
         assert_eq!(rim[0], (640 - RIGHT) * SCALE - 1);
@@ -390,7 +390,7 @@ mod tests {
         assert!(!chart.to_svg().contains("beyond"));
     }
 
-    /// The names of many series take several lines, and none runs over the right end.
+    /// The names of many series take several lines, none of which extends past the right end.
     #[test]
     fn long_legends_are_broken() {
         let name = "a name of thirty-two characters.";
@@ -417,7 +417,7 @@ mod tests {
         assert_eq!(starts[0], starts[2]);
     }
 
-    /// A tile of half the share is half as blue, in both formats; its text stands in it.
+    /// A tile with half the share is half as blue, in both formats, and contains its text.
     #[test]
     fn tiles_are_tinted_by_their_share() {
         let tile = Tile {

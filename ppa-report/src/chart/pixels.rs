@@ -1,4 +1,4 @@
-//! Pixels as a backend of `plotters`, with the letters of `font8x8` in place of the system's fonts.
+//! Pixels as a backend of `plotters`, with the letters of `font8x8` instead of the system's fonts.
 
 use std::convert::Infallible;
 
@@ -13,12 +13,12 @@ use plotters_backend::{
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// `plotters` draws on whole pixels: on a canvas this much larger, which is shown smaller.
+/// Enlargement of the canvas, which is scaled down afterwards, since `plotters` draws on whole pixels.
 pub const SCALE: i32 = 4;
-/// Size of letters on the canvas. The letters of [`Pixels`] have one size, 8 × 8 dots of [`SCALE`].
+/// Font size on the canvas. The letters of [`Pixels`] have one size, 8 × 8 dots of [`SCALE`].
 pub const FONT: i32 = 15 * SCALE;
 
-/// Draws a picture of a size; `draw` sees a canvas [`SCALE`] times as large.
+/// Draws a picture of the given size; `draw` gets a canvas [`SCALE`] times as large.
 pub fn picture(
     size: [u32; 2],
     draw: impl FnOnce(&DrawingArea<Pixels, Shift>) -> Result<(), DrawingAreaErrorKind<Infallible>>,

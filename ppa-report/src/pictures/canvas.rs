@@ -1,4 +1,4 @@
-//! A picture to draw on: rectangles, lines, discs and text, blended by how much of a pixel they cover.
+//! A picture to draw on: rectangles, lines, discs and text, blended by the share of a pixel that they cover.
 //!
 //! Pixel (i, j) covers i..i + 1 to the right and j..j + 1 downwards; its centre is (i + 0.5, j + 0.5).
 
@@ -38,7 +38,7 @@ impl Rect {
 /// Edge length of a glyph at scale 1, pixels.
 pub(super) const GLYPH: u32 = 8;
 
-/// A picture; whatever is drawn stays inside [`Canvas::clip`].
+/// A picture; everything drawn stays inside [`Canvas::clip`].
 pub(super) struct Canvas {
     image: RgbImage,
     clip: Rect,
@@ -61,7 +61,7 @@ impl Canvas {
         self.image
     }
 
-    /// Draws inside a part of the picture only.
+    /// Restricts drawing to a part of the picture.
     pub(super) fn within<T>(&mut self, rect: Rect, draw: impl FnOnce(&mut Self) -> T) -> T {
         let outer = std::mem::replace(&mut self.clip, rect);
         let drawn = draw(self);
@@ -92,7 +92,7 @@ impl Canvas {
         self.stroke(from, to, width, |_| Some((colour, 1.0)));
     }
 
-    /// A line whose colour and opacity depend on the share of the way from `from` (0) to `to` (1).
+    /// A line whose colour and opacity depend on the relative position from `from` (0) to `to` (1).
     pub(super) fn stroke(
         &mut self,
         from: [f64; 2],
@@ -116,7 +116,7 @@ impl Canvas {
         } else {
             (1, 0)
         };
-        // Half the length of the line's cut across the minor axis.
+        // Half the length of the line's cross-section along the minor axis.
         let half = reach * length / along[major].abs();
         let (low, high) = (
             a[major].min(b[major]) - reach,
@@ -158,7 +158,7 @@ impl Canvas {
         }
     }
 
-    /// Text with its top left corner at (x, y), dots of `scale` pixels; a dark edge keeps it legible on anything.
+    /// Text with its top left corner at (x, y), dots of `scale` pixels; a dark edge keeps it legible on any background.
     pub(super) fn text(&mut self, text: &str, [x, y]: [u32; 2], scale: u32, colour: Colour) {
         for (shadow, colour) in [(true, [0; 3]), (false, colour)] {
             for (i, character) in text.chars().enumerate() {
@@ -194,7 +194,7 @@ pub(super) fn text_width(text: &str, scale: u32) -> u32 {
     text.chars().count() as u32 * GLYPH * scale
 }
 
-/// A text in lines of at most `most` characters, broken at spaces where there are any.
+/// A text in lines of at most `most` characters, broken at spaces if possible.
 pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
@@ -217,9 +217,9 @@ pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
     lines
 }
 
-/// Columns and rows of the dots of a character; a question mark for one that the font lacks.
+/// Columns and rows of the dots of a character; a question mark if the font lacks it.
 fn dots(character: char) -> impl Iterator<Item = (u32, u32)> {
-    // The font's superior figures are illegible at this size.
+    // The font's superscript figures are illegible at this size.
     let character = match character {
         '²' => '2',
         '³' => '3',
@@ -242,14 +242,14 @@ fn dots(character: char) -> impl Iterator<Item = (u32, u32)> {
     })
 }
 
-/// Indices of the pixels that reach into low..high, none of them negative.
+/// Indices of the pixels that overlap low..high, none of them negative.
 fn pixels(low: f64, high: f64) -> std::ops::Range<u32> {
     let low = low.floor().max(0.0);
     let high = high.ceil().max(0.0);
     low as u32..high as u32
 }
 
-/// The shares of the way at which a line enters and leaves a rectangle grown by `reach` (Liang and Barsky 1984).
+/// Relative positions at which a line enters and leaves a rectangle grown by `reach` (Liang and Barsky 1984).
 fn clipped(from: [f64; 2], to: [f64; 2], rect: Rect, reach: f64) -> Option<[f64; 2]> {
     if !from.iter().chain(&to).all(|value| value.is_finite()) {
         return None;

@@ -1,4 +1,4 @@
-//! One sheet to check a prepared limb: three slices and three views of the skin.
+//! Picture for checking a prepared limb: three slices and three views of the skin.
 
 use image::RgbImage;
 use nalgebra::Vector3;
@@ -21,9 +21,9 @@ const PANEL_HEIGHT: u32 = (PANELS_END - HEADER - GAP) / 2;
 /// Draws a prepared limb: slices through the joint (axial, coronal, sagittal) above, the skin from the front, its lateral side
 /// and behind below, with axis, joint, axis regions, supporting plane and cut faces.
 ///
-/// `name` heads the sheet: a file's name without folders. Severe findings that are `acknowledged` no longer count as severe. Those
-/// with a place are numbered, and so are their places on the skin. At least 1600 x 1000 pixels; the same
-/// limb gives the same pixels.
+/// `name` is the heading: a file's name without folders. Severe findings that are `acknowledged` no longer count as severe. Severe
+/// findings and cautions with a place are numbered, in the list and on the skin. At least 1600 x 1000 pixels; the same limb gives
+/// the same pixels.
 pub fn case_picture(name: &str, limb: &PreparedLimb, acknowledged: &[FindingCode]) -> RgbImage {
     let landmarks = &limb.landmarks;
     let places = placed_findings(limb).filter_map(|f| f.place_mm);
@@ -37,7 +37,7 @@ pub fn case_picture(name: &str, limb: &PreparedLimb, acknowledged: &[FindingCode
     };
     let mut canvas = frame(name, limb, acknowledged).canvas(legend);
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
-    // Radiological convention: seen from the feet, from the front, and with the front to the left.
+    // Radiological convention: from the feet, from the front, and with the front to the left.
     let slices = [("axial", x, -y), ("coronal", x, z), ("sagittal", y, z)];
     for (column, slice) in slices.into_iter().enumerate() {
         draw_slice(&mut canvas, panel(column, 0), limb, &marks, slice);
@@ -49,7 +49,7 @@ pub fn case_picture(name: &str, limb: &PreparedLimb, acknowledged: &[FindingCode
     canvas.into_image()
 }
 
-/// Where a panel stands.
+/// Position of a panel.
 pub(super) fn panel(column: usize, row: u32) -> Rect {
     Rect {
         x: GAP + column as u32 * (PANEL_WIDTH + GAP),
@@ -59,7 +59,7 @@ pub(super) fn panel(column: usize, row: u32) -> Rect {
     }
 }
 
-/// Title, direction to the right and upwards in the ct frame of each view of the skin.
+/// Title, direction to the right and upwards in the ct frame, for each view of the skin.
 fn skin_views(landmarks: &Landmarks) -> [(&'static str, Vector3<f64>, Vector3<f64>); 3] {
     let ct_from_patient = landmarks.patient_from_ct().inverse();
     let [right, anterior, proximal] =
@@ -75,7 +75,7 @@ fn skin_views(landmarks: &Landmarks) -> [(&'static str, Vector3<f64>, Vector3<f6
     ]
 }
 
-/// Findings at a place that a person should look at, the severest first: their numbers are their places in this list, from 1.
+/// Findings with a place that a person should check, most severe first: their numbers are their positions in this list, from 1.
 fn placed_findings(limb: &PreparedLimb) -> impl Iterator<Item = &Finding> {
     let of = |severity| {
         let findings = limb.findings.iter();
@@ -102,7 +102,7 @@ pub(super) fn remarks(limb: &PreparedLimb, acknowledged: &[FindingCode]) -> Vec<
     found.collect()
 }
 
-/// The limb in two words.
+/// Name of the limb in two words.
 pub(super) fn limb_name(landmarks: &Landmarks) -> String {
     let side = landmarks.side;
     let kind = match landmarks.limb {

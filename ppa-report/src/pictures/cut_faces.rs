@@ -1,10 +1,10 @@
-//! Where the field of view cuts a limb, as a surface.
+//! Surface where the field of view cuts a limb.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_mesh::{Limb, Mesh};
 
-/// Distance by which the surface lies outside the skin's open edge, mm, so that it hides a wall in the same place.
+/// Distance of the surface outside the skin's open edge, mm, so that it hides a wall in the same place.
 const OUTSIDE_MM: f64 = 0.05;
 
 /// One rectangle per voxel of the limb in a face of the volume that cuts it, ct frame, mm.
@@ -29,7 +29,7 @@ pub(super) fn cut_faces(limb: &Limb, grid: &Grid) -> Mesh {
     mesh
 }
 
-/// `+j` is axis 1 at its upper end.
+/// Axis and end of a face: `+j` is axis 1 at its upper end.
 fn axis_and_end(face: &str) -> Option<(usize, f64)> {
     let end = if face.starts_with('-') { -1.0 } else { 1.0 };
     let axis = ["i", "j", "k"]

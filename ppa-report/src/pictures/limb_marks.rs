@@ -1,4 +1,4 @@
-//! Axis, joint, regions and plane of a limb drawn over a view of it in the ct frame.
+//! Axis, joint, regions and plane of a limb, drawn over a view of it in the ct frame.
 
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{AxisRegion, Landmarks, Plane};
@@ -7,16 +7,16 @@ use super::canvas::{Canvas, Colour, mixed, text_width};
 use super::palette::{AXIS, CALF_REGION, INK, JOINT, JOINT_REGION, PLANE, SEVERE};
 use super::view::View;
 
-/// Half the length to which lines are drawn, mm: beyond any panel.
+/// Half the length of drawn lines, mm: beyond any panel.
 const FAR_MM: f64 = 5000.0;
 
-/// A plane is drawn as a line where the view's line of sight leaves it by at most this angle's sine.
+/// Sine of the largest angle between line of sight and plane at which the plane is drawn as a line.
 const EDGE_ON: f64 = 0.35;
 
-/// The view looks along the axis where the cosine of their angle is above this.
+/// Cosine above which the view counts as along the axis.
 const ALONG: f64 = 0.8;
 
-/// Landmarks, ready to be drawn.
+/// Landmarks for drawing.
 pub(super) struct LimbMarks<'a> {
     landmarks: &'a Landmarks,
     joint: Point3<f64>,
@@ -61,14 +61,14 @@ impl<'a> LimbMarks<'a> {
         }
     }
 
-    /// The supporting plane where the view is through the joint, if it is seen nearly edge on.
+    /// Draws the supporting plane in the view's plane through the joint, if it is seen nearly edge-on.
     pub(super) fn draw_plane(&self, canvas: &mut Canvas, view: &View) {
         let (viewer, normal) = (view.towards_viewer(), self.plane.normal.into_inner());
         if viewer.dot(&normal).abs() > EDGE_ON {
             return;
         }
         let along = viewer.cross(&normal).normalize();
-        // Of the plane's points the one straight below the joint within the picture.
+        // The point of the plane straight below the joint in the picture.
         let across = normal - viewer * viewer.dot(&normal);
         let below = self.plane.signed_distance(&self.joint) / across.norm_squared();
         let at = self.joint - across * below;
@@ -76,7 +76,7 @@ impl<'a> LimbMarks<'a> {
         canvas.line(ends[0], ends[1], 2.0, PLANE);
     }
 
-    /// The axis, seen through everything; not where the view looks along it, since the joint then marks it.
+    /// Draws the axis through everything, except in a view along it, since the joint then marks it.
     pub(super) fn draw_axis(&self, canvas: &mut Canvas, view: &View) {
         let at = Point3::from(self.landmarks.axis_point);
         let along = Vector3::from(self.landmarks.axis_direction);
@@ -87,7 +87,7 @@ impl<'a> LimbMarks<'a> {
         canvas.line(ends[0], ends[1], 2.0, AXIS);
     }
 
-    /// The joint, on top of everything.
+    /// Draws the joint, on top of everything.
     pub(super) fn draw_joint(&self, canvas: &mut Canvas, view: &View) {
         let at = view.pixel(&self.joint);
         canvas.ring(at, 6.0, 10.0, [0; 3]);
@@ -95,7 +95,7 @@ impl<'a> LimbMarks<'a> {
         canvas.ring(at, 0.0, 3.5, JOINT);
     }
 
-    /// The three points of the plane: discs where they are seen, rings where `hides` says that something is before them.
+    /// Draws the three points of the plane: discs if visible, rings if `hides` returns that something is in front of them.
     pub(super) fn draw_plane_points(
         &self,
         canvas: &mut Canvas,
@@ -110,11 +110,11 @@ impl<'a> LimbMarks<'a> {
         }
     }
 
-    /// Numbers where the findings are.
+    /// Writes the numbers of the findings at their places.
     pub(super) fn draw_findings(&self, canvas: &mut Canvas, view: &View) {
         for (point, number) in self.findings.iter().zip(1..) {
             let [x, y] = view.pixel(point);
-            // Elsewhere than in the picture, or nowhere.
+            // Outside the picture, or not finite.
             if ![x, y].iter().all(|pixel| (0.0..1e4).contains(pixel)) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Pictures on which a person checks a prepared limb and a placed pose.
+//! Pictures for checking a prepared limb and a placed pose.
 
 mod canvas;
 mod case_picture;

@@ -9,7 +9,7 @@ const MARGIN: u32 = 8;
 /// Lengths of scale bars, mm.
 const BARS_MM: [f64; 8] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
-/// Fills the ground of a panel.
+/// Fills the background of a panel.
 pub(super) fn ground(canvas: &mut Canvas, rect: Rect) {
     canvas.fill(rect, PANEL);
 }
@@ -19,7 +19,7 @@ pub(super) fn title(canvas: &mut Canvas, rect: Rect, text: &str) {
     canvas.text(text, [rect.x + MARGIN, rect.y + MARGIN], 2, INK);
 }
 
-/// Writes which way the ct frame's axes point at the four edges.
+/// Writes the orientation letters of the ct frame at the four edges.
 pub(super) fn orientation(canvas: &mut Canvas, rect: Rect, view: &View) {
     let size = GLYPH * 2;
     let (middle_x, middle_y) = (rect.x + rect.width / 2, rect.y + rect.height / 2 - size / 2);
@@ -29,7 +29,7 @@ pub(super) fn orientation(canvas: &mut Canvas, rect: Rect, view: &View) {
     canvas.text(&left, [rect.x + MARGIN, middle_y], 2, INK);
     canvas.text(&right, [from_right, middle_y], 2, INK);
     let centred = |text: &str| middle_x - text_width(text, 2) / 2;
-    // The title stands in the first line.
+    // The title is in the first line.
     let below_title = rect.y + 2 * MARGIN + size;
     canvas.text(&top, [centred(&top), below_title], 2, INK);
     let lowest = rect.y + rect.height - MARGIN - size;

@@ -7,7 +7,7 @@ use image::{ImageFormat, RgbImage};
 
 use ppa_dataset::files::{FileError, write_whole};
 
-/// Writes a picture as PNG, whole or not at all.
+/// Writes a picture as PNG, completely or not at all.
 ///
 /// # Errors
 /// [`FileError`] when the file cannot be written.

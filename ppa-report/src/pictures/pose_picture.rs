@@ -1,4 +1,4 @@
-//! One sheet to check a limb on the table: the room with device and cameras, and the limb from three sides.
+//! Picture for checking a limb on the table: the room with device and cameras, and the limb from three sides.
 
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
@@ -27,17 +27,17 @@ const ROOM_LAYER: u8 = 0;
 const SKIN_LAYER: u8 = 1;
 const CUT_LAYER: u8 = 2;
 
-/// What is shown below the table top beside the limb, mm.
+/// Height shown below the table top next to the limb, mm.
 const BELOW_MM: f64 = 40.0;
-/// Skin this close to the table counts as lying on it, mm.
+/// Skin this close to the table counts as touching it, mm.
 const TOUCHING_MM: f64 = 1.0;
-/// What is shown of the room around limb, device and cameras in the overview, and around the limb beside it, mm.
+/// Margin around limb, device and cameras in the overview, and around the limb in the other views, mm.
 const AROUND_MM: [f64; 2] = [250.0, 60.0];
 /// Lines this far behind a surface count as hidden, mm.
 const BEHIND_MM: f64 = 4.0;
-/// Opacity of lines that a surface hides.
+/// Opacity of lines hidden by a surface.
 const HIDDEN: f64 = 0.3;
-/// Side of the squares for points of a recorded room over their mean distance.
+/// Side of the squares for points of a recorded room relative to their mean distance.
 const SQUARE: f64 = 1.6;
 
 /// A limb on the table of a plan.
@@ -45,11 +45,11 @@ const SQUARE: f64 = 1.6;
 pub struct PosedLimb<'a> {
     /// The limb.
     pub limb: &'a PreparedLimb,
-    /// How it lies.
+    /// Its placement on the table.
     pub placement: &'a Placement,
     /// Medial rotation, degrees.
     pub angle_deg: f64,
-    /// The room that it lies in.
+    /// The room with the table.
     pub table: &'a Table,
     /// Cameras and detector.
     pub plan: &'a Plan,
@@ -60,10 +60,10 @@ pub struct PosedLimb<'a> {
 /// Draws a placed limb: the room with table, device, detector, beam and both cameras' fields of view, and the limb from its side,
 /// from the source and from the feet with the points on which it rests.
 ///
-/// `name` heads the sheet: a file's name without folders. At least 1600 x 1000 pixels; the same pose gives the same pixels.
+/// `name` is the heading: a file's name without folders. At least 1600 x 1000 pixels; the same pose gives the same pixels.
 ///
 /// # Errors
-/// [`RigError`] for cameras that cannot be read or make no sense.
+/// [`RigError`] for cameras that cannot be read or are invalid.
 pub fn pose_picture(name: &str, posed: &PosedLimb) -> Result<RgbImage, RigError> {
     let rig = posed.plan.depth.cameras()?;
     let scene = PoseScene::new(
@@ -181,7 +181,7 @@ fn draw_side(
     panel::scale_bar(canvas, rect, &view);
 }
 
-/// The room and the limb, of the room only what lies near some points.
+/// Rasterises the limb and the part of the room near some points.
 fn rasterised(
     rect: Rect,
     view: View,
@@ -208,7 +208,7 @@ fn rasterised(
 }
 
 fn draw_cloud(raster: &mut Raster, cloud: &PointCloud) {
-    // One point has no distance to others; any square shows it.
+    // A single point has no distance to others; any square shows it.
     let spacing_mm = mean_spacing_mm(&cloud.points).unwrap_or(1.0);
     raster.cloud(cloud, SQUARE * spacing_mm, ROOM_LAYER);
 }
@@ -255,7 +255,7 @@ fn draw_limb_marks(canvas: &mut Canvas, view: &View, scene: &PoseScene) {
     canvas.ring(at, 0.0, 4.5, JOINT);
 }
 
-/// A line in space, fainter where a surface hides it.
+/// Draws a line in space, fainter where a surface hides it.
 fn stroke(
     canvas: &mut Canvas,
     raster: &Raster,
@@ -273,7 +273,7 @@ fn stroke(
     });
 }
 
-/// How far a part of the limb is above the table, in hundredths of a millimetre.
+/// Height of a part of the limb above the table, in hundredths of a millimetre.
 fn above(part: &str, height_mm: f64) -> String {
     let hundredths = (100.0 * height_mm).round();
     let place = if hundredths < 0.0 { "inside" } else { "above" };

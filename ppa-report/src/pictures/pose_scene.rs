@@ -18,13 +18,13 @@ pub(super) struct ViewCone {
     pub(super) corners: [Point3<f64>; 4],
 }
 
-/// A placed limb with what stands around it; room frame, mm.
+/// A placed limb with its surroundings; room frame, mm.
 pub(super) struct PoseScene<'a> {
     pub(super) table: &'a Table,
     /// Across the table, towards the head, up.
     pub(super) axes: Matrix3<f64>,
     pub(super) skin: Mesh,
-    /// Where the field of view cuts the limb.
+    /// Faces where the field of view cuts the limb.
     pub(super) cuts: Mesh,
     pub(super) joint: Point3<f64>,
     /// Two points of the limb's axis, far apart.
@@ -107,8 +107,8 @@ impl<'a> PoseScene<'a> {
     }
 }
 
-/// Directions of the four corners of an image, in the camera; where the lens has no ray, those of the nearest pixels on the way
-/// to the middle that have one.
+/// Directions of the four corners of an image, in the camera frame; if the lens has no ray there, those of the nearest pixels towards the
+/// middle that have one.
 fn corner_rays(camera: &Camera) -> [Vector3<f64>; 4] {
     let [width, height] = [camera.width(), camera.height()].map(|pixels| f64::from(pixels - 1));
     [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[u, v]| {

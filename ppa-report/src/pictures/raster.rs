@@ -9,12 +9,12 @@ use super::view::View;
 /// Samples along each side of a pixel.
 const SAMPLES: u32 = 2;
 
-/// What a sample sees.
+/// The surface seen by a sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
-    /// Which surface.
+    /// Which surface it is.
     pub(super) layer: u8,
-    /// Where, mm.
+    /// The point seen, mm.
     pub(super) point: Point3<f64>,
     /// Normal of the surface, of unit length and towards the viewer.
     pub(super) normal: Vector3<f64>,
@@ -29,12 +29,12 @@ struct Sample {
     normal: Vector3<f32>,
 }
 
-/// What a panel sees of some surfaces.
+/// Surfaces seen in a panel.
 pub(super) struct Raster {
     view: View,
     rect: Rect,
     samples: Vec<Option<Sample>>,
-    /// Nothing outside this box is seen: low and high corner, mm.
+    /// Only points in this box are shown: low and high corner, mm.
     within: Option<[Point3<f64>; 2]>,
 }
 
@@ -49,7 +49,7 @@ impl Raster {
         }
     }
 
-    /// Leaves out what lies outside a box in the frame of the surfaces.
+    /// Leaves out everything outside a box in the frame of the surfaces.
     pub(super) fn within(self, low: Point3<f64>, high: Point3<f64>) -> Self {
         Self {
             within: Some([low, high]),
@@ -57,7 +57,7 @@ impl Raster {
         }
     }
 
-    /// Place of a point among the samples, and how near it is.
+    /// Position of a point among the samples, and its nearness.
     fn place(&self, point: &Point3<f64>) -> [f64; 3] {
         let [x, y] = self.view.pixel(point);
         let scale = f64::from(SAMPLES);
@@ -120,7 +120,7 @@ impl Raster {
             for row in range(1, height) {
                 for column in range(0, width) {
                     let at = [f64::from(column) + 0.5, f64::from(row) + 0.5];
-                    // Twice the area between an edge and the sample, as a share of the triangle's.
+                    // Twice the area between an edge and the sample, relative to that of the triangle.
                     let share = |p: [f64; 3], q: [f64; 3]| {
                         ((q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])) / area
                     };
@@ -172,7 +172,7 @@ impl Raster {
         }
     }
 
-    /// Nearness of the nearest surface at a pixel; nothing outside the panel or where nothing is.
+    /// Nearness of the nearest surface at a pixel; `None` outside the panel or if there is no surface.
     pub(super) fn nearness(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let scale = f64::from(SAMPLES);
         let at = |pixel: f64, first: u32| ((pixel - f64::from(first)) * scale).floor();
@@ -187,7 +187,7 @@ impl Raster {
         Some(sample.nearness.into())
     }
 
-    /// Paints what is seen, each sample in the colour that `colour` gives it.
+    /// Paints each sample in the colour that `colour` returns for it.
     pub(super) fn paint(&self, canvas: &mut Canvas, colour: impl Fn(&Seen) -> Colour) {
         let viewer = self.view.towards_viewer();
         let width = self.size()[0];
@@ -220,7 +220,7 @@ impl Raster {
         }
     }
 
-    /// A surface's colour in the light from above left behind the viewer.
+    /// Colour of a surface lit from above left behind the viewer.
     pub(super) fn lit(&self, colour: Colour, normal: &Vector3<f64>) -> Colour {
         let View { right, up, .. } = self.view;
         let light = (self.view.towards_viewer() + up * 0.6 - right * 0.5).normalize();

@@ -11,11 +11,11 @@ pub(super) const WIDTH: u32 = 1600;
 pub(super) const HEIGHT: u32 = 1000;
 pub(super) const GAP: u32 = 8;
 pub(super) const HEADER: u32 = 76;
-/// Where panels end and remarks begin, pixels from the top.
+/// End of the panels and start of the remarks, pixels from the top.
 pub(super) const PANELS_END: u32 = 916;
-/// Distance of lines of text, pixels.
+/// Line spacing of text, pixels.
 const LINE: u32 = 22;
-/// Most lines of remarks.
+/// Largest number of lines of remarks.
 const MOST_LINES: usize = 24;
 
 /// Colour of remarks.
@@ -34,7 +34,7 @@ pub(super) struct Remark {
     pub(super) text: String,
 }
 
-/// How a thing looks in the panels.
+/// Appearance of an item in the panels.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Swatch {
     Area(Colour),
@@ -51,7 +51,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// A picture with header, legend, facts and remarks; panels are drawn into it.
+    /// Creates a picture with header, legend, facts and remarks; panels are drawn into it.
     pub(super) fn canvas(&self, legend: Rect) -> Canvas {
         let lines = self.remark_lines();
         let remarks_end = PANELS_END + GAP + LINE * lines.len() as u32 + GAP;
@@ -76,7 +76,7 @@ impl Frame {
         }
     }
 
-    /// How many remarks there are that a person has to look at.
+    /// Number of remarks of each severity that a person has to check.
     fn verdict(&self) -> Vec<(String, Colour)> {
         let count = |severity| {
             let remarks = self.remarks.iter();

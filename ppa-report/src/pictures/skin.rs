@@ -1,4 +1,4 @@
-//! A view of a limb's skin as it lies in the scan.
+//! A view of a limb's skin in the scan.
 
 use nalgebra::Vector3;
 use ppa_mesh::Mesh;
@@ -13,10 +13,10 @@ use super::view::View;
 const SKIN_LAYER: u8 = 0;
 const CUT_LAYER: u8 = 1;
 
-/// A point of the skin may lie this far behind what is seen there and still be seen, mm.
+/// Depth tolerance at which a point of the skin still counts as visible, mm.
 const ON_SKIN_MM: f64 = 3.0;
 
-/// Draws the skin and where it is cut, seen with `right` and `up` in the picture, ct frame.
+/// Draws the skin and its cut faces, with `right` and `up` in the picture, ct frame.
 pub(super) fn draw_skin(
     canvas: &mut Canvas,
     rect: Rect,
@@ -33,7 +33,7 @@ pub(super) fn draw_skin(
     raster.paint(canvas, |seen| {
         let colour = match (seen.layer, seen.from_behind) {
             (SKIN_LAYER, false) => marks.tinted(SKIN, &seen.point),
-            // The inside of the skin shows only where it is open.
+            // The inside of the skin is visible only where the skin is open.
             (SKIN_LAYER, true) => mixed(CUT, [0; 3], 0.4),
             _ => CUT,
         };

@@ -11,10 +11,10 @@ use super::palette::{OUTLINE, PANEL};
 use super::panel;
 use super::view::View;
 
-/// HU that are black and white.
+/// HU shown as black and white.
 const WINDOW_HU: [f64; 2] = [-450.0, 1050.0];
 
-/// How far what does not belong to the limb fades into the panel's ground.
+/// How far voxels outside the limb fade into the panel's background.
 const FADED: f64 = 0.55;
 
 /// Draws the slice through the joint whose axes are `right` and `up`, ct frame.
@@ -76,7 +76,7 @@ fn nearest_voxel(grid: &Grid, voxel_from_ct: &Affine3<f64>, point: &Point3<f64>)
     inside.then(|| grid.index([0, 1, 2].map(|axis| at[axis] as usize)))
 }
 
-/// Where the plane of nearness 0 cuts a mesh.
+/// Intersection of a mesh with the plane of nearness 0.
 fn outline(mesh: &Mesh, view: &View) -> Vec<[Point3<f64>; 2]> {
     let nearness: Vec<f64> = mesh
         .vertices

@@ -39,7 +39,7 @@ static LEG: LazyLock<PreparedLimb> =
     LazyLock::new(|| prepared(phantom(), &LandmarkOverrides::default()));
 static PICTURE: LazyLock<RgbImage> = LazyLock::new(|| case_picture("leg.case.toml", &LEG, &[]));
 
-/// Middles of the pixels of a panel that have a colour.
+/// Centres of the pixels of a panel that have a colour.
 fn coloured(picture: &RgbImage, rect: Rect, colour: [u8; 3]) -> Vec<[f64; 2]> {
     let [[left, right], [top, bottom]] = rect.ends();
     let pixels = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
@@ -53,10 +53,10 @@ fn mean(points: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / points.len() as f64)
 }
 
-/// The joint's disc is drawn over the axis, so that the line through the axis' pixels has to meet the disc's middle.
+/// The joint's disc is drawn over the axis, so the line through the axis' pixels has to meet the middle of the disc.
 #[test]
 fn the_axis_meets_the_joint_within_a_pixel_in_every_panel() {
-    // The axial slice shows the axis as little more than a point.
+    // In the axial slice, the axis is little more than a point.
     let panels = [(1, 0), (2, 0), (0, 1), (1, 1), (2, 1)];
     for (column, row) in panels {
         let rect = panel(column, row);
@@ -85,7 +85,7 @@ fn a_picture_has_its_size_and_the_same_bytes_every_time() {
     assert_eq!(write("a.png"), write("b.png"));
 }
 
-/// The phantom's proximal end is cut by its volume anyway; the front half of the volume is cut away besides.
+/// The phantom's proximal end is cut by its volume anyway; here the front half of the volume is cut away as well.
 #[test]
 fn the_skin_is_outlined_and_its_cut_is_shown() {
     for column in 0..3 {
@@ -108,7 +108,7 @@ fn the_skin_is_outlined_and_its_cut_is_shown() {
     assert!(after > before + 1000, "{before} and {after} pixels");
 }
 
-/// The same scan, its columns stored from left to right instead of from right to left and its slices first.
+/// The same scan with its columns stored from left to right instead of from right to left and its slices first.
 fn stored_otherwise(volume: &Volume) -> Volume {
     let [ni, nj, nk] = volume.grid().size();
     let affine = volume.grid().ct_from_voxel().matrix();
@@ -146,7 +146,7 @@ fn the_picture_does_not_depend_on_how_the_scan_is_stored() {
     }
 }
 
-/// A block of metal left of the joint lies on the viewer's right where the letter L stands.
+/// A block of metal left of the joint is on the viewer's right, at the letter L.
 #[test]
 fn the_patients_left_is_on_the_viewers_right() {
     let volume = phantom();
@@ -199,7 +199,7 @@ fn odd_limbs_have_pictures_too() {
         limb: Some(LimbKind::Other),
         ..LandmarkOverrides::default()
     };
-    // Beside the limb.
+    // Next to the limb.
     let [x, y, z] = LEG.landmarks.joint_centre;
     let far_joint = LandmarkOverrides {
         joint_centre: Some([x + 80.0, y, z]),
@@ -247,7 +247,7 @@ fn a_posed_limb_rests_on_the_points_that_are_marked() {
         }
         let head = scene.axes.column(1);
         assert!(head.dot(&(proximal - distal)) > 0.0);
-        // Both cameras stand above the table, and the joint lies inside what they see of it.
+        // Both cameras are above the table, and the joint is inside the part of it that they see.
         for cone in &scene.cones {
             assert!(plane.signed_distance(&cone.eye) > 500.0);
             let [across, head] = [0, 1].map(|i| scene.axes.column(i).into_owned());

@@ -7,15 +7,15 @@ use super::canvas::Rect;
 /// A parallel projection of space, mm, into a panel, pixels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
-    /// The point that falls on [`Self::middle`].
+    /// The point projected onto [`Self::middle`].
     centre: Point3<f64>,
     /// Unit direction to the right in the picture.
     pub(super) right: Vector3<f64>,
     /// Unit direction upwards in the picture.
     pub(super) up: Vector3<f64>,
-    /// The pixel on which the centre falls.
+    /// The pixel onto which the centre is projected.
     middle: [f64; 2],
-    /// Size of a millimetre.
+    /// Pixels per millimetre.
     pub(super) pixels_per_mm: f64,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct View {
 const FREE: f64 = 0.06;
 
 impl View {
-    /// A view in which all points fit into `rect`. `right` and `up` are perpendicular unit vectors.
+    /// Builds a view in which all points fit into `rect`. `right` and `up` are perpendicular unit vectors.
     pub(super) fn fitting(
         rect: Rect,
         [right, up]: [Vector3<f64>; 2],
@@ -59,7 +59,7 @@ impl View {
         self.right.cross(&self.up)
     }
 
-    /// The pixel on which a point falls.
+    /// The pixel onto which a point is projected.
     pub(super) fn pixel(&self, point: &Point3<f64>) -> [f64; 2] {
         let offset = point - self.centre;
         [
@@ -68,19 +68,19 @@ impl View {
         ]
     }
 
-    /// How near to the viewer a point lies, mm.
+    /// Coordinate of a point towards the viewer, mm.
     pub(super) fn nearness(&self, point: &Point3<f64>) -> f64 {
         self.towards_viewer().dot(&(point - self.centre))
     }
 
-    /// The point at a pixel with a nearness.
+    /// The point at a pixel with a given nearness.
     pub(super) fn point(&self, [x, y]: [f64; 2], nearness: f64) -> Point3<f64> {
         let across = (x - self.middle[0]) / self.pixels_per_mm;
         let upwards = (self.middle[1] - y) / self.pixels_per_mm;
         self.centre + self.right * across + self.up * upwards + self.towards_viewer() * nearness
     }
 
-    /// The same view moved along the line of sight so that a point has the nearness 0.
+    /// The same view moved along the line of sight so that a point has nearness 0.
     pub(super) fn through(self, point: &Point3<f64>) -> Self {
         Self {
             centre: self.centre + self.towards_viewer() * self.nearness(point),
@@ -91,7 +91,7 @@ impl View {
 
 /// Orientation letters of a direction in the ct frame (LPS), the strongest first: L or R, P or A, H or F.
 ///
-/// A second or third letter is there if the direction leans towards it by more than 20 degrees.
+/// A second or third letter is added if the direction leans towards it by more than 20 degrees.
 pub(super) fn letters(direction: &Vector3<f64>) -> String {
     const LEAN: f64 = 0.342; // sin 20°
     let mut parts: Vec<(f64, char)> = direction
@@ -128,7 +128,7 @@ mod tests {
             let again = view.point([x, y], view.nearness(&point));
             assert!((again - point).norm() < 1e-9);
         }
-        // To the right is +x, upwards is +z, and the viewer looks along +y.
+        // Right is +x, up is +z, and the viewer looks along +y.
         let [low, high] = points.map(|p| view.pixel(&p));
         assert!(low[0] < high[0] && low[1] > high[1]);
         assert!(view.nearness(&points[1]) > view.nearness(&points[0]));

@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, html};
 
 use crate::chart::{Chart, Series, range};
 
-/// A chart of several series; `y_range` where it shall not follow from the points.
+/// A chart of several series; `y_range` if it should not follow from the points.
 pub(super) fn chart(
     x_label: &str,
     y_label: &str,

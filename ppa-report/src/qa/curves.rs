@@ -18,10 +18,10 @@ use super::scene::Scene;
 use crate::chart::{Mark, Series};
 use crate::contact_sheet::evenly_chosen;
 
-/// Depth images per limb and camera that histograms are made of.
+/// Depth images per limb and camera used for histograms.
 const SAMPLE: usize = 24;
 
-/// Outliers are looked for beyond these jumps, mm and degrees.
+/// Smallest jumps that count as outliers, mm and degrees.
 const FLOOR: [f64; 2] = [0.5, 0.1];
 
 pub(super) fn labels(dataset: &Published, limb: LimbId) -> Markup {
@@ -74,7 +74,7 @@ pub(super) fn histograms<'a>(
         let chosen = evenly_chosen(&steps, SAMPLE);
         let mut depths = Depths::default();
         for row in rows.into_iter().filter(|row| chosen.contains(&row.step)) {
-            // What cannot be read stands among the flaws.
+            // Unreadable images are listed as flaws.
             let Ok(image) = GrayImage16::read(&root.join(&row.file)) else {
                 continue;
             };
@@ -90,17 +90,17 @@ pub(super) fn histograms<'a>(
     chart("depth, mm", "pixels, %", series, None)
 }
 
-/// What heights and tilts show.
+/// Charts and outliers of heights and tilts.
 pub(super) struct Sweeps {
     /// Two charts.
     pub charts: Markup,
     /// A sentence on every pose that does not follow from its neighbours.
     pub html: Markup,
-    /// Their number.
+    /// Number of these poses.
     pub outliers: usize,
 }
 
-/// What is followed from pose to pose, with its unit.
+/// Quantities that are followed from pose to pose, with their units.
 pub(super) const COURSES: [[&str; 2]; 2] = [
     ["height of the joint", "mm"],
     ["tilt of the axis", "degrees"],
@@ -114,7 +114,7 @@ pub(super) struct Course {
     pub odd: Vec<usize>,
 }
 
-/// A quantity of [`COURSES`] over poses by angle.
+/// The course of a quantity of [`COURSES`] over poses by angle.
 pub(super) fn course(scene: &Scene, rows: &[&FileRow], quantity: usize) -> Course {
     let point = |row: &&FileRow| [row.angle_deg, scene.height_and_tilt(row)[quantity]];
     let points: Vec<[f64; 2]> = rows.iter().map(point).collect();
@@ -126,7 +126,7 @@ pub(super) fn course(scene: &Scene, rows: &[&FileRow], quantity: usize) -> Cours
     Course { points, odd }
 }
 
-/// How height and tilt of a limb change from pose to pose.
+/// Changes of height and tilt of a limb from pose to pose.
 pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Sweeps {
     let (mut charts, mut sentences) = (Vec::new(), Vec::new());
     for (i, [what, unit]) in COURSES.into_iter().enumerate() {

@@ -14,8 +14,8 @@ fn share(row: &FileRow) -> f64 {
     row.cut_share.unwrap_or(0.0)
 }
 
-/// The shares of a limb's images against rotation, a curve per camera and one of the radiographs, and the largest of them in
-/// percent; `None` where nothing is cut. Of several body shapes each pose has its largest share.
+/// The shares of a limb's images against rotation, with a curve per camera and one for the radiographs, and the largest share in
+/// percent; `None` if nothing is cut. With several body shapes, each pose has its largest share.
 pub(super) fn cut_shares(rows: &[&FileRow]) -> Option<(Markup, f64)> {
     let largest = rows.iter().map(|row| share(row)).fold(0.0, f64::max);
     if largest == 0.0 {

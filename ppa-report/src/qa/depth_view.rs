@@ -7,7 +7,7 @@ use ppa_depth::false_colour;
 
 use crate::drawing::{INK, draw_circle, fill_disc};
 
-/// A whole depth image in false colour over a range of depths, mm, with its region of interest framed and the joint as a dot in
+/// A whole depth image in false colour over a range of depths, mm, with its region of interest framed and the joint marked by a dot in
 /// a ring.
 pub(super) fn depth_view(
     image: &GrayImage16,
@@ -29,12 +29,12 @@ pub(super) fn depth_view(
     view
 }
 
-/// Whether a column or row lies within a region that starts at `start`.
+/// Whether a column or row is within a region that starts at `start`.
 fn within(at: u32, start: u32, roi: &RoiRow) -> bool {
     (start..start.saturating_add(roi.size)).contains(&at)
 }
 
-/// Draws the border of a region, two pixels wide, as far as it lies in the image.
+/// Draws the border of a region, two pixels wide, as far as it is in the image.
 fn frame(view: &mut RgbImage, roi: &RoiRow) {
     let on_edge = |at: u32, start: u32| {
         let far = start.saturating_add(roi.size).saturating_sub(2);
@@ -48,7 +48,7 @@ fn frame(view: &mut RgbImage, roi: &RoiRow) {
     }
 }
 
-/// Pictures beside each other, each in the middle of a part of the same width.
+/// Pictures side by side, each centred in a part of the same width.
 pub(super) fn strip(pictures: &[RgbImage]) -> RgbImage {
     const GAP: u32 = 6;
     let [width, height] = pictures.iter().fold([0, 0], |[width, height], one| {

@@ -1,4 +1,4 @@
-//! Why a dataset has no quality report.
+//! Errors of the quality report.
 
 use ppa_dataset::files::FileError;
 use ppa_dataset::published::PublishedError;
@@ -6,7 +6,7 @@ use ppa_dataset::split::SplitError;
 
 use crate::contact_sheet::ContactSheetError;
 
-/// Why there is no page.
+/// Why the quality report cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum QaError {

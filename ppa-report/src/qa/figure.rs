@@ -9,7 +9,7 @@ use ppa_dataset::files::FileError;
 use super::error::QaError;
 use crate::embedded::data_uri;
 
-/// A figure, or nothing without content.
+/// A figure, or nothing if there is no content.
 pub(super) fn figure(caption: &str, content: Markup) -> Markup {
     html! {
         @if !content.0.is_empty() {

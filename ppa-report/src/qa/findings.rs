@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use ppa_core::text::numbers;
 use ppa_dataset::findings::{Findings, LimbFinding, Severity};
 
-/// One table, severe findings that nobody acknowledged first; nothing without findings.
+/// One table, with severe unacknowledged findings first; nothing if there are no findings.
 pub(super) fn table(findings: &Findings) -> Markup {
     let mut rows: Vec<&LimbFinding> = findings.0.iter().collect();
     rows.sort_by_key(|row| {
@@ -35,7 +35,7 @@ fn row(row: &LimbFinding) -> Markup {
         (false, Severity::Severe | Severity::Caution) => Some("caution"),
         (false, Severity::Note) => None,
     };
-    // The code as scripts and `acknowledged` in a case know it.
+    // The code as used by scripts and by `acknowledged` in a case.
     let code = serde_json::to_value(finding.code).ok();
     let code = code.as_ref().and_then(|code| code.as_str()).unwrap_or("");
     let place = finding

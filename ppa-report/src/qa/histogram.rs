@@ -16,7 +16,7 @@ pub(super) struct Depths {
 }
 
 impl Depths {
-    /// Adds the pixels of a region, or of the whole image without one.
+    /// Adds the pixels of a region, or of the whole image if there is none.
     pub fn add(&mut self, image: &GrayImage16, roi: Option<&RoiRow>) {
         let [columns, rows] = match roi {
             None => [0..image.width, 0..image.height],
@@ -45,7 +45,7 @@ impl Depths {
         self.invalid as f64 / all.max(1) as f64
     }
 
-    /// Share of the valid pixels per bin, in percent, from the first bin that holds any to the last.
+    /// Share of the valid pixels per bin, in percent, from the first to the last non-empty bin.
     pub fn series(&self, name: &str) -> Series {
         let valid = self.counts.iter().sum::<u64>().max(1) as f64;
         let first = self.counts.iter().position(|&count| count > 0).unwrap_or(0);

@@ -18,10 +18,10 @@ use super::scale::colour_scale;
 use super::scene::Scene;
 use crate::contact_sheet::{Tiles, evenly_chosen, tiles};
 
-/// Poses that are shown of a limb.
+/// Number of poses shown per limb.
 const COLUMNS: usize = 7;
 
-/// The part of the page on one limb, and how many of its poses stand out.
+/// The section of one limb, and the number of its outliers.
 pub(super) struct LimbPart {
     pub html: Markup,
     pub outliers: usize,
@@ -142,7 +142,7 @@ fn whole_view(
 ) -> Result<Markup, QaError> {
     let camera = row.camera.map_or("", View::name).replace('_', " ");
     let text = format!("{camera}, {}°", angle_text(row.step));
-    // What is wrong with it stands among the flaws.
+    // An unreadable image is listed as a flaw.
     let Ok(image) = GrayImage16::read(&root.join(&row.file)) else {
         return Ok(figure(&text, html! { p class="bad" { "cannot be read" } }));
     };

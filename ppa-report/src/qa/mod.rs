@@ -1,4 +1,4 @@
-//! Quality report: a dataset on one page, to be read before anything is trained on it.
+//! Quality report: a dataset on one page, to be read before training on it.
 
 mod chart;
 mod curves;

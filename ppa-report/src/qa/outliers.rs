@@ -1,21 +1,21 @@
 //! Poses that do not follow from their neighbours.
 //!
-//! A limb that turns step by step rises and tilts smoothly. A value is reported if its distance from the line between its two neighbours is much
-//! larger than the bend usual in its sweep explains. Where poses are missing, that line is longer: a smooth curve deviates from it by half its second
-//! derivative times the product of the steps on both sides.
+//! A limb rotated in steps rises and tilts smoothly. A value is reported if its distance from the line between its two neighbours is
+//! much larger than the bend usual in its sweep explains. Where poses are missing, that line is longer: a smooth curve deviates from it
+//! by half its second derivative times the product of the steps on both sides.
 //!
-//! The first and the last pose have neighbours on one side only. Such an end must lie off two lines, through the first and second and
-//! through the third and fourth pose from it: if one of these four is the outlier, one of the lines does not contain it. The pose next to an end that
-//! stands out is compared with the line through the two poses after it.
+//! The first and the last pose have neighbours on one side only. Such an end must be off two lines, through the first and second and
+//! through the third and fourth pose from it: if one of these four is the outlier, one of the lines does not contain it. The pose next
+//! to an outlier at an end is compared with the line through the two poses after it.
 
-/// How far beyond the usual bend a pose must be.
+/// Smallest deviation of an outlier relative to the usual bend.
 const FACTOR: f64 = 8.0;
 
-/// How much more than in the middle a pose at an end must be off: noise of two points is up to four times as large where their
-/// line is prolonged to four steps from the nearer one.
+/// Factor on this limit at an end: noise of two points is up to four times as large if their line is extrapolated four steps from
+/// the nearer one.
 const AT_ENDS: f64 = 4.0;
 
-/// In shorter sweeps a pose that stands out spoils what is usual: it moves three of the distances.
+/// In shorter sweeps an outlier distorts the median: it affects three of the distances.
 pub(super) const LEAST_POSES: usize = 9;
 
 /// A distance from a line, and the product of the steps to both its points.
@@ -25,7 +25,7 @@ struct Off {
     steps: f64,
 }
 
-/// How far a point lies from the line through two others.
+/// Distance of a point from the line through two others.
 fn off(point: [f64; 2], [a, b]: [[f64; 2]; 2]) -> Off {
     let [from_a, from_b] = [point[0] - a[0], point[0] - b[0]];
     let line = (b[1] * from_a - a[1] * from_b) / (b[0] - a[0]);
@@ -35,10 +35,10 @@ fn off(point: [f64; 2], [a, b]: [[f64; 2]; 2]) -> Off {
     }
 }
 
-/// Positions of the points (a rising parameter with a value each) that lie off the line between their neighbours by more than
-/// `floor` and [`FACTOR`] times what the median bend of the sweep explains.
+/// Positions of the points (an increasing parameter with a value each) that are off the line between their neighbours by more than
+/// `floor` and by more than [`FACTOR`] times what the median bend of the sweep explains.
 ///
-/// An outlier pulls the lines of both its neighbours as well, but by less: only the largest of adjacent ones counts.
+/// An outlier also shifts the lines of both its neighbours, but by less: of adjacent ones, only the largest counts.
 pub(super) fn outliers(points: &[[f64; 2]], floor: f64) -> Vec<usize> {
     let inner = points.windows(3).map(|p| off(p[1], [p[0], p[2]]));
     let mut inner: Vec<Off> = inner.collect();
@@ -100,7 +100,7 @@ mod tests {
         assert!(outliers(&[[0.0, 1.0], [1.0, 2.0]], 0.5).is_empty());
     }
 
-    /// From 80 to 110 the sine bends most: beside the hole it leaves the line by 1 mm, which is not an outlier.
+    /// From 80 to 110 the sine bends most: next to the gap it is off the line by 1 mm, which is not an outlier.
     #[test]
     fn poses_beside_a_hole_are_none_and_a_jump_beside_it_is() {
         let mut holed = sweep((0..80).chain(110..181));

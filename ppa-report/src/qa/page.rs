@@ -15,11 +15,11 @@ use super::limb::{LimbPart, limb_part};
 use super::scene::Scene;
 use super::verdict::Tally;
 
-/// The dataset in `root`, which `ppa generate` finished, as one page of HTML without any address outside of it: verdict, findings, checks of all
-/// files, contact sheets, regions and joints in whole images, labels against angle, depths, heights and tilts with outliers, origin.
+/// Writes the quality report of the finished dataset in `root` as one HTML page without external addresses: verdict, findings, checks of
+/// all files, contact sheets, regions and joints in whole images, labels against angle, depths, heights and tilts with outliers, origin.
 ///
 /// # Errors
-/// [`QaError`] naming the file at fault. Flaws of single images stand on the page, and a cross in their place.
+/// [`QaError`] naming the file at fault. Flaws of single images are listed on the page, with a cross in place of the image.
 pub fn qa_page(root: &Path) -> Result<String, QaError> {
     let manifest = Manifest::read(root)?;
     let inspection = inspect(root)?;
@@ -101,7 +101,7 @@ fn checks(root: &Path, flaws: &[Flaw]) -> Markup {
     }
 }
 
-/// An error with its causes. The page may be passed on: where the dataset lay is nobody's business.
+/// An error with its causes, without the dataset's folder, because the page may be passed on.
 fn without_folder(error: &dyn std::error::Error, root: &Path) -> String {
     let folder = root.join("").display().to_string();
     error_chain(error).replace(&folder, "")

@@ -1,4 +1,4 @@
-//! The poses of a dataset as rows, with those that stand out: what the page draws, for views that choose among them.
+//! The poses of a dataset as rows, with their outliers: the data of the page, for interactive views.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,17 +27,17 @@ pub struct PoseRow {
     pub angle_deg: f64,
     /// Height of the joint above the table, mm.
     pub height_mm: f64,
-    /// How far the limb's axis points away from the table, degrees.
+    /// Angle of the limb's axis away from the table, degrees.
     pub tilt_deg: f64,
     /// Largest share of the region of interest of an image of the pose that shows a cut face, 0 to 1.
     pub cut_share: f64,
     /// Quality of the pose.
     pub label: Option<Label>,
-    /// What does not follow from the poses beside it.
+    /// Quantities that are outliers relative to neighbouring poses.
     pub stands_out: Vec<&'static str>,
 }
 
-/// The poses that the left camera sees in the dataset `root`, by limb, body shape and angle, with the outliers of the quality report.
+/// The poses seen by the left camera in the dataset `root`, by limb, body shape and angle, with the outliers of the quality report.
 ///
 /// # Errors
 /// [`QaError`] naming the file at fault.

@@ -1,4 +1,4 @@
-//! The colours of depths, with their values.
+//! The colour scale of depths.
 
 use maud::{Markup, html};
 use plotters::coord::ranged1d::Ranged;
@@ -9,7 +9,7 @@ use ppa_depth::false_colour;
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 46.0;
 const LEFT: f64 = 12.0;
-/// End of the bar; right of it stands the colour of pixels without depth.
+/// End of the bar; to its right is the colour of pixels without depth.
 const RIGHT: f64 = 352.0;
 const STEPS: u32 = 68;
 
@@ -24,7 +24,7 @@ pub(super) fn colour_scale(range_mm: [f64; 2]) -> Markup {
         let left = format!("{:.2}", at(share) - width / 2.0);
         (left, format!("#{r:02x}{g:02x}{b:02x}"))
     });
-    // As many as a chart of this width has.
+    // As many as in a chart of this width.
     let ticks = RangedCoordf64::from(near..far).key_points(8).into_iter();
     let ticks = ticks.map(|tick| {
         (
@@ -36,7 +36,7 @@ pub(super) fn colour_scale(range_mm: [f64; 2]) -> Markup {
         svg class="scale" viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img"
             aria-label=(format!("colours of depths from {near:.0} to {far:.0} mm")) {
             @for (left, colour) in steps {
-                // Half a pixel wider, so that no gaps show between neighbours.
+                // Half a pixel wider, to avoid gaps between neighbours.
                 rect x=(left) y="2" width=(format!("{:.2}", width + 0.5)) height="16" fill=(colour) {}
             }
             @for (x, text) in ticks {

@@ -49,7 +49,7 @@ pub(super) struct Limb {
     pub volume_sha256: String,
 }
 
-/// Cameras in their room, and where the images come from.
+/// Cameras in their room, and the origin of the images.
 pub(super) struct Scene {
     pub generator: String,
     pub code: String,
@@ -82,7 +82,7 @@ impl Scene {
         })
     }
 
-    /// Pixel on which the joint (the patient frame's origin) of a depth image falls; `None` outside the lens' field.
+    /// Pixel onto which the joint (the patient frame's origin) is projected in a depth image; `None` outside the lens' field.
     pub fn joint_pixel(&self, row: &FileRow) -> Option<[f64; 2]> {
         let (_, camera, camera_from_room) = self
             .cameras
@@ -94,8 +94,8 @@ impl Scene {
         Some([pixel.x, pixel.y])
     }
 
-    /// Height of the joint above the table, mm, and how far the limb's axis points away from it, degrees. A recorded room may
-    /// have any frame: only the table shows what is up.
+    /// Height of the joint above the table, mm, and angle of the limb's axis away from it, degrees. A recorded room may have any
+    /// frame: only the table determines the upward direction.
     pub fn height_and_tilt(&self, row: &FileRow) -> [f64; 2] {
         let pose = row.room_from_patient;
         let up = |column: usize| -> f64 {

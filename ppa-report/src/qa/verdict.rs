@@ -1,25 +1,25 @@
-//! The verdict at the top of the page, from all that was found.
+//! The verdict at the top of the page.
 
 use maud::{Markup, html};
 use ppa_core::text::count;
 
-/// What was found in a dataset, in numbers.
+/// Counts of what was found in a dataset.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tally {
     /// Damaged or missing images and lists.
     pub flaws: usize,
     /// Severe findings that nobody acknowledged.
     pub severe: usize,
-    /// Severe findings that were acknowledged, and cautions; notes count nowhere.
+    /// Severe findings that were acknowledged, and cautions; notes are not counted.
     pub other_findings: usize,
-    /// Poses that do not follow from those beside them.
+    /// Poses that are outliers relative to their neighbours.
     pub outliers: usize,
     /// Limbs without depth images.
     pub empty_limbs: usize,
 }
 
 impl Tally {
-    /// One bar: red where the dataset should not be used as it is, yellow where something should be looked at, else green.
+    /// One bar: red if the dataset should not be used as it is, yellow if something should be checked, otherwise green.
     pub fn html(&self) -> Markup {
         let list = |counts: &[(usize, &str, &str)]| {
             let there = counts.iter().filter(|(n, ..)| *n > 0);

@@ -2,24 +2,24 @@
 
 use serde::Serialize;
 
-/// Thresholds are taken a quarter lower and a third higher as well: stricter and more lenient readers.
+/// Factors on the thresholds, which stand for stricter and more lenient readers.
 pub(super) const VARIED: [f64; 3] = [0.75, 1.0, 4.0 / 3.0];
 
-/// A label and how far it depends on what was assumed.
+/// A label and its dependence on assumptions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ComputedLabel {
     /// Grade from 1 (ideal) to 3 (inadequate) in half steps: that of the worst gutter.
     pub label: f64,
-    /// Half the range of grades that other thresholds and tolerances give; not a reader's standard deviation.
+    /// Half the range of grades under other thresholds and tolerances; not a reader's standard deviation.
     pub std: f64,
     /// Grades of the medial, the superior and the lateral gutter.
     pub gutters: [f64; 3],
-    /// How good the worst gutter is before it is graded, 0 to 1.
+    /// Quality of the worst gutter before grading, 0 to 1.
     pub worst: f64,
 }
 
 impl ComputedLabel {
-    /// From the grades of the gutters, and those of the worst one that other thresholds and tolerances give.
+    /// Builds a label from the grades of the gutters and the grades of the worst one under other thresholds and tolerances.
     pub(super) fn new(gutters: [f64; 3], varied: impl Iterator<Item = f64>, worst: f64) -> Self {
         let widen = |(low, high): (f64, f64), grade: f64| (low.min(grade), high.max(grade));
         let (low, high) = varied.fold((3.0, 1.0), widen);

@@ -1,4 +1,4 @@
-//! Why thresholds cannot be used.
+//! Errors of thresholds.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ pub enum ScaleError {
     /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The file holds something else.
+    /// The file contains no thresholds of the scale.
     #[error("{} holds no thresholds of the {scale} scale: {message}", path.display())]
     Parse {
         /// The file.
@@ -23,15 +23,15 @@ pub enum ScaleError {
         /// What is wrong.
         message: String,
     },
-    /// Openness out of order.
+    /// Thresholds of openness that do not decrease.
     #[error("thresholds of openness are {}, expected four decreasing numbers from 0 to 1", ppa_core::text::numbers(*.0))]
     Falling([f64; 4]),
-    /// What may be hidden out of order.
+    /// Thresholds of hidden parts that do not increase.
     #[error("{key} is {}, expected four increasing numbers from 0 to {most}", ppa_core::text::numbers(*found))]
     Rising {
         /// The key.
         key: &'static str,
-        /// What it says.
+        /// Its numbers.
         found: [f64; 4],
         /// The largest number allowed.
         most: f64,

@@ -7,24 +7,24 @@ use super::error::ScaleError;
 use crate::openness::hidden::HiddenGutters;
 use crate::openness::joint_space::Openness;
 
-/// How much of a gutter may be hidden for a grade; beyond the last one the grade is 3. The worst gutter decides.
+/// Largest hidden part of a gutter for each grade; beyond the last one the grade is 3. The worst gutter decides.
 ///
 /// A radiographer accepts a mortise view if all three gutters are open and no malleolus lies over the talus (Wheeless' Textbook of
-/// Orthopaedics, "Mortise view"). What lies over it is graded linearly: 3.75 mm ends the diagnostic range, [1, 2.5), and the other
+/// Orthopaedics, "Mortise view"). An overlap is graded linearly: the diagnostic range, [1, 2.5), ends at 3.75 mm, and the other
 /// thresholds are where a line from 1 at 0 mm is rounded to another half step.
 ///
 /// No reader has set these numbers. `hidden_mm` is fitted to one figure: readers in the paper (Laufer et al., MELBA 2026:027) called
 /// about 41 % of the poses from 0° to 90° diagnostic, which follows from the sensitivity, specificity and accuracy of its table 1. In
 /// the 17 phantoms, whose axis is inclined by 4° to the detector as when they lie on a table, 3.75 mm give 41 %, a window of 37°, and
-/// best angles of 20° on average (95 % of bootstrap samples of the feet: 17° to 22.5°); 41 % ask for 3.8 mm (3.4 to 4.2 mm). With axes
+/// best angles of 20° on average (95 % of bootstrap samples of the feet: 17° to 22.5°); 41 % would need 3.8 mm (3.4 to 4.2 mm). With axes
 /// parallel to the detector 3.75 mm give 36 %. `lost_contrast` is not fitted: rotation hardly closes the superior gutter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GradedThresholds {
-    /// By how many mm a malleolus may cover the talus for the grades 1, 1.5, 2 and 2.5, as the median over the height of the
-    /// gutter: rising, at most 50.
+    /// Largest overlap of a malleolus with the talus for the grades 1, 1.5, 2 and 2.5, as the median over the height of the
+    /// gutter, mm: increasing, at most 50.
     pub hidden_mm: [f64; 4],
-    /// How much the superior gutter may lose of its best contrast: rising, from 0 to 1.
+    /// Largest loss of the superior gutter's best contrast for these grades: increasing, from 0 to 1.
     pub lost_contrast: [f64; 4],
 }
 
@@ -39,7 +39,7 @@ impl Default for GradedThresholds {
 
 impl GradedThresholds {
     /// # Errors
-    /// [`ScaleError::Rising`] naming thresholds that do not rise or lie outside their range.
+    /// [`ScaleError::Rising`] naming thresholds that do not increase or are out of range.
     pub fn check(&self) -> Result<(), ScaleError> {
         let rise = |key, found: [f64; 4], most| {
             let rising = found.windows(2).all(|pair| pair[0] < pair[1]);
@@ -53,7 +53,7 @@ impl GradedThresholds {
         rise("lost_contrast", self.lost_contrast, 1.0)
     }
 
-    /// The grade of an exposure by its worst gutter; the uncertainty from thresholds a quarter lower and a third higher.
+    /// Grades an exposure by its worst gutter; the uncertainty follows from thresholds a quarter lower and a third higher.
     pub fn grade(&self, openness: &Openness, hidden: &HiddenGutters) -> ComputedLabel {
         let gutters = |scale: f64| {
             let exceeded = |limits: [f64; 4], found: f64| {

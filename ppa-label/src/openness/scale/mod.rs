@@ -1,4 +1,4 @@
-//! From what an exposure shows of the joint space to the quality scale.
+//! Quality scales for the visible joint space.
 
 mod computed_label;
 mod error;
@@ -25,9 +25,9 @@ use super::joint_space::Openness;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "scale", rename_all = "snake_case")]
 pub enum LabelScale {
-    /// By how far malleoli hide the gutters.
+    /// Graded by how far the malleoli hide the gutters.
     Graded(GradedThresholds),
-    /// By how open the worst gutter is.
+    /// Graded by how open the worst gutter is.
     Strict(StrictThresholds),
 }
 
@@ -41,7 +41,7 @@ impl LabelScale {
     }
 
     /// Reads thresholds from TOML: `hidden_mm` and `lost_contrast` of the graded scale, `relative_to` (`"own_best"` or
-    /// `"each_gutter"`) and `at_least` of the strict one; what is left out has its default.
+    /// `"each_gutter"`) and `at_least` of the strict one; missing keys have their defaults.
     ///
     /// # Errors
     /// [`ScaleError`] naming the file, or thresholds out of order.
@@ -63,7 +63,7 @@ impl LabelScale {
         }
     }
 
-    /// The grade of an exposure.
+    /// Grades an exposure.
     pub fn grade(&self, openness: &Openness, hidden: &HiddenGutters) -> ComputedLabel {
         match self {
             Self::Graded(thresholds) => thresholds.grade(openness, hidden),
@@ -71,7 +71,7 @@ impl LabelScale {
         }
     }
 
-    /// Who says so, in files; `segmented` if `ppa prepare --segment-bones` separated the bones.
+    /// Source of the labels as named in files; `segmented` if `ppa prepare --segment-bones` separated the bones.
     pub(crate) fn source(&self, segmented: bool) -> LabelSource {
         match (self, segmented) {
             (Self::Graded(_), false) => LabelSource::Graded,

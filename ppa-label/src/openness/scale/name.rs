@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-/// A name that no scale has.
+/// A name that is not a scale.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown scale {0:?}, expected graded or strict")]
 pub struct UnknownScale(String);
@@ -14,7 +14,7 @@ pub struct UnknownScale(String);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScaleName {
-    /// By how far malleoli hide the gutters: as wide as readers' grades.
+    /// By how far the malleoli hide the gutters: as wide as readers' grades.
     #[default]
     Graded,
     /// By how open the worst gutter is.

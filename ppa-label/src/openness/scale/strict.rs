@@ -6,27 +6,27 @@ use super::computed_label::{ComputedLabel, VARIED};
 use super::error::ScaleError;
 use crate::openness::joint_space::Openness;
 
-/// What an openness of 1 stands for.
+/// Reference that has openness 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OpennessReference {
-    /// The worst gutter from the direction that opens all three of this foot best: every foot has an ideal pose.
+    /// The worst gutter from the direction that opens all three of this foot best, so every foot has an ideal pose.
     #[default]
     OwnBest,
-    /// Each gutter from the direction that opens it best: a foot whose facets part has no ideal pose.
+    /// Each gutter from the direction that opens it best, so a foot with diverging facets has no ideal pose.
     EachGutter,
 }
 
-/// How open the worst gutter must be for a grade; below the last one the grade is 3.
+/// Least openness of the worst gutter for each grade; below the last one the grade is 3.
 ///
 /// No reader has set these numbers. With the defaults a pose is diagnostic (below 2.5) while the worst gutter shows a quarter of
 /// what this foot can attain: in the phantoms up to about 5° either side of the best pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StrictThresholds {
-    /// What openness is relative to.
+    /// Reference of openness.
     pub relative_to: OpennessReference,
-    /// Least openness for the grades 1, 1.5, 2 and 2.5: from 0 to 1, falling.
+    /// Least openness for the grades 1, 1.5, 2 and 2.5: from 0 to 1, decreasing.
     pub at_least: [f64; 4],
 }
 
@@ -41,7 +41,7 @@ impl Default for StrictThresholds {
 
 impl StrictThresholds {
     /// # Errors
-    /// [`ScaleError::Falling`] unless the thresholds fall and lie from 0 to 1.
+    /// [`ScaleError::Falling`] unless the thresholds decrease and are from 0 to 1.
     pub fn check(&self) -> Result<(), ScaleError> {
         let found = self.at_least;
         let falling = found.windows(2).all(|pair| pair[0] > pair[1]);
@@ -53,7 +53,7 @@ impl StrictThresholds {
         }
     }
 
-    /// The grade of an exposure by its worst gutter; the uncertainty from the three tolerances of
+    /// Grades an exposure by its worst gutter; the uncertainty follows from the three tolerances of
     /// [`FREE_CHORDS_MM`](crate::FREE_CHORDS_MM) and thresholds a quarter lower and a third higher.
     pub fn grade(&self, openness: &Openness) -> ComputedLabel {
         let worst = self.scaled(openness, openness.worst());
@@ -117,7 +117,7 @@ mod tests {
             ..EACH
         };
         let label = |worst| own.grade(&openness(0.9, worst, 0.9)).label;
-        // The best that this foot shows is 0.5.
+        // The best openness of this foot is 0.5.
         assert_eq!(label(0.5), 1.0);
         assert_eq!(label(0.225), 1.0);
         assert_eq!(label(0.22), 1.5);

@@ -1,4 +1,4 @@
-//! Rays that cross blocks in one step measure what single steps do, bit for bit.
+//! Rays that cross blocks in one step give the same lengths as single steps, bit for bit.
 
 use super::bones::Body;
 use super::gap_voxels::GapVoxels;

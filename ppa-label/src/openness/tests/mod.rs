@@ -1,4 +1,4 @@
-//! Slabs and phantoms, whose openness is known.
+//! Slabs and phantoms with known openness.
 
 mod chords;
 mod phantoms;
@@ -14,7 +14,7 @@ use ppa_ct::Grid;
 use ppa_dataset::labels::BoneNumbers;
 use ppa_phantom::{LowerLeg, Side, Truth};
 
-/// A patient who lies as the scan: LPS has y posterior and z proximal.
+/// A patient aligned with the scan: LPS has y posterior and z proximal.
 fn ct_from_patient(joint: Point3<f64>, axis: Vector3<f64>) -> Isometry3<f64> {
     let z = axis.normalize();
     let y = (-Vector3::y() + z * z.y).normalize();
@@ -52,7 +52,7 @@ fn patient(truth: &Truth) -> Isometry3<f64> {
     ct_from_patient(truth.joint_centre, truth.axis_direction.into_inner())
 }
 
-/// A phantom's right ankle, by its true bones.
+/// A phantom's right ankle, from its true bones.
 struct Ankle {
     leg: LowerLeg,
     truth: Truth,
@@ -64,8 +64,8 @@ struct Ankle {
 /// Spacing of the voxels of [`ankle`].
 const ANKLE_SPACING_MM: f64 = 0.8;
 
-/// The ankle of a phantom of the family, P01 to P17, made once. Not to be called from a thread of rayon: one that waits for the voxels
-/// would take up work that asks for the same ankle, and wait for itself.
+/// The ankle of a phantom of the family, P01 to P17, built once. Must not be called from a rayon thread: one that waits for the voxels
+/// could start work that needs the same ankle, and wait for itself.
 fn ankle(number: usize) -> &'static Ankle {
     static ANKLES: [OnceLock<Ankle>; 17] = [const { OnceLock::new() }; 17];
     ANKLES[number - 1].get_or_init(|| {
@@ -87,7 +87,7 @@ fn family() -> Vec<&'static Ankle> {
     (1..=17).map(ankle).collect()
 }
 
-/// The limb turned inwards: the tube goes the other way round.
+/// The limb rotated inwards: the tube moves in the opposite direction.
 fn turned(space: &JointSpace, side: Side, degrees: f64) -> Exposure {
     let sign = match side {
         Side::Right => -1.0,

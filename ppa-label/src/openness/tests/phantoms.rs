@@ -1,10 +1,10 @@
-//! Gates that computed labels must pass on phantoms before anyone uses them.
+//! Requirements that computed labels must meet on phantoms before anyone uses them.
 
 use rayon::prelude::*;
 
 use super::*;
 
-/// What is seen of a phantom's ankle by turns inwards.
+/// Openness of a phantom's ankle by internal rotation.
 struct Seen {
     /// Every 2 degrees from 0 to 46.
     level: Vec<Openness>,
@@ -27,8 +27,8 @@ fn inclined_exposures(space: &JointSpace) -> Vec<Exposure> {
         .collect()
 }
 
-/// Of all seventeen in one go: half of the rays look for the direction that opens an ankle best. Not to be called from a thread of
-/// rayon either.
+/// Of all seventeen at once: half of the rays search for the direction that opens an ankle best. Must not be called from a rayon
+/// thread either.
 fn family_seen() -> &'static [Seen] {
     static SEEN: OnceLock<Vec<Seen>> = OnceLock::new();
     SEEN.get_or_init(|| {
@@ -50,7 +50,7 @@ fn family_seen() -> &'static [Seen] {
 fn most_open_rotation(found: &[Openness]) -> f64 {
     let degrees = level_degrees();
     let worst: Vec<f64> = found.iter().map(|o| o.worst()[1]).collect();
-    // Both flanks are steep: the middle of what is at least nine tenths of the best.
+    // Both flanks are steep: the mean of the rotations that reach at least nine tenths of the best.
     let best = worst.iter().copied().fold(0.0, f64::max);
     assert!(best > 0.2, "{worst:?}");
     let near: Vec<f64> = (0..worst.len())
@@ -123,13 +123,13 @@ fn check_measures(name: &str, Ankle { space, truth, .. }: &Ankle) -> [Option<f64
     let clear = [front, turned].map(|o| o.tibiofibular_clear_space_mm);
     near(overlap[0], 11.2, 8.8, "overlap at 0");
     near(overlap[1], 4.2, 3.4, "overlap at 15");
-    // The floor of the incisura is not to be seen in every view.
+    // The floor of the incisura is not visible in every view.
     for (found, mean, sd) in [(clear[0], 2.4, 1.3), (clear[1], 4.5, 1.2)] {
         let within = |found: f64| (found - mean).abs() < 2.0 * sd;
         assert!(found.is_none_or(within), "{name}: {clear:?}");
     }
     assert!(overlap[1] < overlap[0], "{name}: {overlap:?}");
-    // Each malleolus lies beside the talus in the view along its own gutter, and over it half a right angle away.
+    // Each malleolus is next to the talus in the view along its own gutter, and over it half a right angle away.
     let lateral = at(truth.lateral_gutter_angle_rad.to_degrees());
     let away = at(truth.mortise_angle_rad.to_degrees() + 45.0);
     println!("{name}: {open:?} {lateral:?} {away:?}");
@@ -172,7 +172,7 @@ fn every_phantom_measures_as_it_was_made_and_as_published() {
     assert!((mean - 3.03).abs() < 0.72, "{mean}");
 }
 
-/// A detector turned about the beam sees one crest above the other.
+/// A detector rotated about the beam sees one crest above the other.
 #[test]
 fn a_tilted_trochlea_shows_its_crests_apart() {
     let (space, truth) = mortise("P01", Side::Right, 1.0);
@@ -187,7 +187,7 @@ fn a_tilted_trochlea_shows_its_crests_apart() {
         space.overlaps(&exposure).talar_crest_offset_mm
     };
     let found = [-8.0, 0.0, 8.0].map(tilted);
-    // The highest places of both halves lie about half a trochlea apart, 10 to 20 mm, times tan 8°.
+    // The highest points of both halves are about half a trochlea apart, 10 to 20 mm, times tan 8°.
     let rises = [found[1] - found[0], found[2] - found[1]];
     assert!(
         rises.iter().all(|r| (1.0..4.0).contains(&r.abs())) && rises[0] * rises[1] > 0.0,

@@ -1,4 +1,4 @@
-//! Bones that were separated in the scan give the joint space of the true ones.
+//! Bones separated in the scan give the joint space of the true ones.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::{SegmentError, SegmentedBones, segment_bones};
 use ppa_ct::Volume;
 use ppa_phantom::{Scanner, TableTop};
 
-/// What a perfect scanner sees around the ankle of a phantom.
+/// The ankle of a phantom as seen by a perfect scanner.
 fn sharp(leg: &LowerLeg, spacing_mm: f64) -> Volume {
     let joint = leg.truth().joint_centre;
     let reach = Vector3::repeat(62.0);
@@ -15,7 +15,7 @@ fn sharp(leg: &LowerLeg, spacing_mm: f64) -> Volume {
         .unwrap()
 }
 
-/// The bones of a phantom, separated in what a scanner shows of it.
+/// The bones of a phantom, separated in its scan.
 fn segmented(truth: &Truth, sharp: &Volume, noise_hu: f64) -> Result<SegmentedBones, SegmentError> {
     let scanner = Scanner {
         blur_fwhm_mm: 0.9,
@@ -49,7 +49,7 @@ fn check(name: &str, ankle: &Ankle) {
         let sum = count(&|at| is(&found.labels, at)) + count(&|at| is(&true_labels, at));
         let dice = 2.0 * both as f64 / sum as f64;
         println!("{name} {bone:?}: Dice {dice:.4}");
-        // A surface that lies a tenth of a voxel further out takes 0.005 of the fibula.
+        // A surface a tenth of a voxel further out changes this by 0.005 for the fibula.
         assert!(dice > 0.98, "{name} {bone:?}: {dice}");
     }
     let [segmented, labelled] = [
@@ -84,7 +84,7 @@ fn check(name: &str, ankle: &Ankle) {
     }
 }
 
-/// P08 has the narrowest syndesmosis, 1.0 mm: its shafts hang together in the scan.
+/// P08 has the narrowest syndesmosis, 1.0 mm: its shafts are connected in the scan.
 const NARROWEST: usize = 8;
 
 #[test]
@@ -100,7 +100,7 @@ fn bones_of_every_other_phantom_are_told_apart() {
     numbers.for_each(|n| check(&format!("P{n:02}"), ankles[n - 1]));
 }
 
-/// A sharp kernel: voxels of soft tissue pass 200 HU by noise alone, here and there.
+/// A sharp kernel: noise alone raises some voxels of soft tissue above 200 HU.
 #[test]
 fn specks_of_noise_are_no_bones() {
     let leg = LowerLeg::family("P01", Side::Right).unwrap();

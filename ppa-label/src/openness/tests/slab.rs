@@ -1,21 +1,21 @@
-//! A joint of boxes, whose gutters open as a formula predicts.
+//! A joint of boxes, whose gutters open according to a formula.
 
 use super::*;
 
 /// Depth of every box along the beam, mm.
 const DEPTH: f64 = 25.0;
 
-/// A talus of 10 x 25 x 15 mm between a fork of boxes: gutters of `width` mm beside it and above it, all 25 mm deep.
+/// A talus of 10 x 25 x 15 mm in a fork of boxes: gutters of `width` mm next to it and above it, all 25 mm deep.
 fn fork(spacing: f64, width: f64) -> AnkleBones {
     flexed_fork(spacing, width, 0.0)
 }
 
-/// The same with its talus turned about the middle of its upper face, toes down.
+/// The same with its talus rotated about the middle of its upper face, toes down.
 fn flexed_fork(spacing: f64, width: f64, flexion_deg: f64) -> AnkleBones {
     let (sine, cosine) = flexion_deg.to_radians().sin_cos();
     let half = 17.0;
     let n = (2.0 * half / spacing) as usize;
-    // The faces of the boxes lie between voxel centres.
+    // The faces of the boxes are between voxel centres.
     let first = 0.5 * spacing - half;
     let grid = Grid::axis_aligned(
         [n; 3],
@@ -44,7 +44,7 @@ fn flexed_fork(spacing: f64, width: f64, flexion_deg: f64) -> AnkleBones {
 }
 
 fn openness(space: &JointSpace, degrees: &[f64]) -> Vec<Openness> {
-    // Far away, so that rays are nearly parallel, as the formula of the slab has them.
+    // Far away, so that rays are nearly parallel, as the formula of the slab assumes.
     let exposures: Vec<_> = degrees
         .iter()
         .map(|d| Exposure::around(&space.limb, d.to_radians(), 1e5))
@@ -76,7 +76,7 @@ fn a_slab_closes_at_atan_of_width_over_depth() {
                 assert!((found[side][1] - 0.5).abs() < 0.1, "{width}: {found:?}");
             }
             for side in found[3..].chunks(steps.len()) {
-                // With half a millimetre of bone let through the slab seems so much less deep: 0.14 degrees.
+                // If half a millimetre of bone is tolerated, the slab seems that much less deep: 0.14 degrees.
                 let shut = side.iter().position(|open| open[0] < 0.02);
                 let half_window = steps[shut.expect("it closes")];
                 println!("{width}: {half_window:.2}, {closes:.2}");
@@ -138,7 +138,7 @@ fn flexion_closes_a_plane_superior_gutter_as_the_formula_tells() {
     }
 }
 
-/// Chords do not come in steps of the ray, 0.4 mm, or tolerances of 0.5, 1 and 2 mm would act as 0.4, 0.8 and 2.
+/// Chords are not multiples of the ray's step, 0.4 mm; otherwise tolerances of 0.5, 1 and 2 mm would act as 0.4, 0.8 and 2.
 #[test]
 fn chords_are_as_long_as_the_body_is_deep() {
     let bones = fork(0.5, 4.0);
@@ -158,12 +158,12 @@ fn chords_are_as_long_as_the_body_is_deep() {
             (found - expected).abs() < 0.08,
             "{angle}: {found}, {expected}"
         );
-        // What is longer than asked for is reported to be longer, no more.
+        // Longer chords are only reported to be longer.
         assert!(ray.chord_mm(&bones, &[talus], 2.0) > 2.0);
     }
 }
 
-/// Two faces of depth L that stand w apart overlap by L sin φ − w cos φ.
+/// Two faces of depth L at a distance w overlap by L sin φ − w cos φ.
 #[test]
 fn a_slab_is_hidden_by_what_its_faces_overlap() {
     let width = 3.0;

@@ -1,8 +1,8 @@
-//! Effect of other sides and beam directions.
+//! Effect of the other side and of beam directions.
 
 use super::*;
 
-/// A mirrored foot, turned the other way, opens alike: within the rays that run along an edge of a voxel.
+/// A mirrored foot, rotated the other way, has the same openness up to the rays that run along an edge of a voxel.
 #[test]
 fn left_and_right_give_one_curve() {
     use Side::{Left, Right};
@@ -44,8 +44,8 @@ fn left_and_right_give_one_curve() {
 }
 
 /// A tilted leg, a flexed foot and a beam centred elsewhere along the leg all change the angle between beam and leg. The gap
-/// between trochlea and plafond is part of a cylinder: it looks alike until the beam meets the end of its arc, about 20
-/// degrees from the middle, and closes from there on.
+/// between trochlea and plafond is part of a cylinder: it looks the same until the beam meets the end of its arc, about 20
+/// degrees from the middle, and closes beyond that.
 #[test]
 fn tilt_closes_the_superior_gutter_beyond_the_end_of_its_arc() {
     let side = Side::Right;
