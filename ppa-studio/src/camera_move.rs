@@ -9,19 +9,19 @@ use crate::error::StudioError;
 /// Farthest shift along an axis, mm.
 const FARTHEST_MM: f64 = 3000.0;
 
-/// How a camera is moved.
+/// Shift and rotation of a camera.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct CameraMove {
-    /// Along the axes of the device: x, y towards the patient's feet, z along the central beam.
+    /// Shift along the axes of the device: x, y towards the patient's feet, z along the central beam.
     pub shift_mm: [f64; 3],
-    /// About its own axes, in this order: the view direction (roll), the image's rows (tilt), the image's columns (pan).
+    /// Rotations about the camera's axes, in this order: view direction (roll), image rows (tilt), image columns (pan).
     pub turn_deg: [f64; 3],
 }
 
 impl CameraMove {
     /// # Errors
-    /// [`StudioError::Invalid`] for a shift beyond 3 m or a turn beyond 180 degrees.
+    /// [`StudioError::Invalid`] for a shift beyond 3 m or a rotation beyond 180 degrees.
     pub fn check(&self) -> Result<(), StudioError> {
         let within = |values: &[f64; 3], most: f64| values.iter().all(|v| v.abs() <= most);
         if within(&self.shift_mm, FARTHEST_MM) && within(&self.turn_deg, 180.0) {
@@ -36,7 +36,7 @@ impl CameraMove {
     /// Moves a camera.
     ///
     /// # Errors
-    /// [`RigidError`] for a camera whose place is no rigid motion.
+    /// [`RigidError`] if the pose of the camera is not a rigid motion.
     pub fn apply(&self, mounted: &mut MountedCamera) -> Result<(), RigidError> {
         let [roll, tilt, pan] = self.turn_deg.map(f64::to_radians);
         let about = |axis: &nalgebra::Unit<Vector3<f64>>, angle| {
@@ -75,10 +75,10 @@ mod tests {
         let [old_view, new_view] = [old * Vector3::z(), new * Vector3::z()];
         let cos = pan.to_radians().cos() * tilt.to_radians().cos();
         assert!((old_view.dot(&new_view) - cos).abs() < 1e-12);
-        // Pan turns the view towards the image's right, where x points.
+        // Pan rotates the view towards the image's right, where x points.
         let right = (old * Vector3::x()).dot(&new_view);
         assert!((right - pan.to_radians().sin() * tilt.to_radians().cos()).abs() < 1e-12);
-        // Tilt turns it towards the image's top, against y.
+        // Tilt rotates it towards the image's top, against y.
         let down = (old * Vector3::y()).dot(&new_view);
         assert!((down + tilt.to_radians().sin()).abs() < 1e-12);
     }

@@ -6,16 +6,16 @@ use ppa_generate::{Case, beside_case, edited_case};
 
 use crate::error::StudioError;
 
-/// Where a case stands, and where its changes are saved as they are made.
+/// Paths of a case file and of the file for its changes, which are saved as they are made.
 pub(crate) struct CaseFile {
     original: PathBuf,
     edited: PathBuf,
-    /// The edited file as this program knows it; `None` while there is none.
+    /// Text of the edited file as last read or saved by this program; `None` if there is none.
     known: Option<String>,
 }
 
 impl CaseFile {
-    /// `leg.case.toml`, whose changes go to `leg.edited.case.toml`.
+    /// Returns the files of a case. Changes of `leg.case.toml` go to `leg.edited.case.toml`.
     pub fn new(original: PathBuf) -> Self {
         let edited = edited_case(&original);
         let known = std::fs::read_to_string(&edited).ok();
@@ -34,25 +34,25 @@ impl CaseFile {
         &self.edited
     }
 
-    /// Where a plan with the page's changes is saved: beside the original.
+    /// Returns the path for a plan with the page's changes, next to the original.
     pub fn plan(&self) -> PathBuf {
         beside_case(&self.original, "studio.plan.toml")
     }
 
-    /// Where moved cameras are saved: beside the original.
+    /// Returns the path for moved cameras, next to the original.
     pub fn cameras(&self) -> PathBuf {
         beside_case(&self.original, "studio.rig.json")
     }
 
-    /// Whether changes are saved beside the original.
+    /// Whether changes are saved next to the original.
     pub fn has_edits(&self) -> bool {
         self.known.is_some()
     }
 
-    /// Saves a changed case beside the original, with the comments that either has.
+    /// Saves a changed case next to the original. Keeps the comments of the earlier edited file, or of the original.
     ///
     /// # Errors
-    /// [`StudioError::ChangedElsewhere`] if the file is no longer the one that was saved last.
+    /// [`StudioError::ChangedElsewhere`] if the file has changed since it was last saved.
     pub fn save_edits(&mut self, case: &Case) -> Result<(), StudioError> {
         if std::fs::read_to_string(&self.edited).ok() != self.known {
             return Err(StudioError::ChangedElsewhere(self.edited.clone()));
@@ -69,14 +69,14 @@ impl CaseFile {
         Ok(())
     }
 
-    /// Writes the case over the original, which the person has asked for, and removes the changes beside it.
+    /// Overwrites the original with the case, at the user's request, and removes the changes next to it.
     pub fn save(&mut self, case: &Case) -> Result<(), StudioError> {
         match std::fs::read_to_string(&self.original) {
             Ok(text) => case.write_edited(&text, &self.original)?,
             Err(_) => case.write(&self.original)?,
         }
         if self.has_edits() && std::fs::read_to_string(&self.edited).ok() == self.known {
-            // The original holds all of it now; a file that cannot be removed is shown as changes again.
+            // The original holds all changes now; a file that cannot be removed is shown as changes again.
             let _ = std::fs::remove_file(&self.edited);
         }
         self.known = None;
@@ -84,7 +84,7 @@ impl CaseFile {
     }
 }
 
-/// Where the plan of a dataset with a case is saved, if none was opened.
+/// Returns the path for the plan of a dataset with this case, used if no plan was opened.
 pub(crate) fn new_plan(case: &Path) -> PathBuf {
     beside_case(case, "plan.toml")
 }

@@ -1,4 +1,4 @@
-//! The scan with fewer voxels, whose surface follows a slider.
+//! A downsampled scan whose surface follows a slider.
 
 use ppa_ct::{Interpolation, Volume};
 use ppa_generate::PreparedLimb;
@@ -8,7 +8,7 @@ use crate::display_mesh::display_mesh;
 use crate::error::StudioError;
 use crate::removed::removed;
 
-/// Most voxels of the coarse scan: its surface takes some tenths of a second.
+/// Maximum number of voxels of the coarse scan: its surface takes some tenths of a second.
 const MOST_VOXELS: f64 = 4e6;
 
 /// The scan with at most four million voxels.
@@ -16,7 +16,7 @@ pub(crate) struct CoarseScan(Volume);
 
 impl CoarseScan {
     /// # Errors
-    /// [`StudioError::Volume`] without the memory for it.
+    /// [`StudioError::Volume`] if there is not enough memory.
     pub fn new(scan: &Volume) -> Result<Self, StudioError> {
         let grid = scan.grid();
         let coarser = (grid.len() as f64 / MOST_VOXELS).cbrt();
@@ -27,13 +27,13 @@ impl CoarseScan {
         }))
     }
 
-    /// The surface of everything in the scan at a HU, for display.
+    /// Returns the surface of everything in the scan at a HU, for display.
     pub fn surface(&self, iso_hu: f32) -> Result<Mesh, StudioError> {
         let surface = iso_surface(&self.0, iso_hu, Border::Open)?;
         Ok(display_mesh(&surface, &[]).0)
     }
 
-    /// The surface of what was removed beside and inside a limb, for display; none where nothing was.
+    /// Returns the surface of what was removed outside and inside a limb, for display; empty if nothing was removed.
     pub fn removed(&self, limb: &PreparedLimb, iso_hu: f32) -> Result<Mesh, StudioError> {
         let removed = removed(&self.0, &limb.volume, &limb.limb.mask, iso_hu)?;
         match iso_surface(&removed, iso_hu, Border::Open) {

@@ -1,4 +1,4 @@
-//! Command lines that do the same as the page, to be copied.
+//! Command lines, to be copied, that do the same as the page.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub(crate) struct ImageCommands {
     pub radiograph: String,
     pub dose: String,
     pub coverage: String,
-    /// The plan that they read has to be saved first: it holds changes that no option makes.
+    /// Whether the plan that they read must be saved first, because no option can make its changes.
     pub need_saved_plan: bool,
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct PlanCommands {
     pub status: String,
 }
 
-/// The dataset of a plan file as commands.
+/// Returns the commands that make the dataset of a plan file.
 pub(crate) fn of_plan(plan: &Path, dataset: &Path) -> PlanCommands {
     let (plan, dataset) = (quoted(plan), quoted(dataset));
     PlanCommands {
@@ -51,14 +51,14 @@ pub(crate) fn of_plan(plan: &Path, dataset: &Path) -> PlanCommands {
     }
 }
 
-/// Commands that look at a dataset.
+/// Commands that examine a dataset.
 #[derive(Debug, Serialize)]
 pub(crate) struct DatasetCommands {
     pub quality: String,
     pub check: String,
 }
 
-/// A dataset as commands.
+/// Returns the commands that examine a dataset.
 pub(crate) fn of_dataset(dataset: &Path) -> DatasetCommands {
     let dataset = quoted(dataset);
     DatasetCommands {
@@ -67,18 +67,18 @@ pub(crate) fn of_dataset(dataset: &Path) -> DatasetCommands {
     }
 }
 
-/// Commands that do with the grades of readers what the page does.
+/// Commands that process the grades of readers as the page does.
 #[derive(Debug, Serialize)]
 pub(crate) struct GradingCommands {
     pub import: String,
     pub agree: String,
 }
 
-/// The grades of a folder for readers as commands.
+/// Returns the commands for the grades in a folder for readers.
 pub(crate) fn of_grading(dataset: &Path, sheets: &Path, key: &Path) -> GradingCommands {
     let grades = dataset.join("grades.csv");
     let (dataset, key) = (quoted(dataset), quoted(key));
-    // The shell finds the files of all readers.
+    // The shell expands this to the files of all readers.
     let sheets = format!("{}/grades_*.csv", quoted(sheets));
     GradingCommands {
         import: format!("ppa label import {dataset} --key {key} {sheets}"),
@@ -86,24 +86,24 @@ pub(crate) fn of_grading(dataset: &Path, sheets: &Path, key: &Path) -> GradingCo
     }
 }
 
-/// The evaluation of a training as a command.
+/// Returns the command that evaluates a training run.
 pub(crate) fn of_training(run: &Path) -> String {
     format!("ppa eval {}", quoted(run))
 }
 
-/// The judgement of a folder of frames as a command.
+/// Returns the command that predicts from the frames of a watched folder.
 pub(crate) fn of_watch(networks: &Networks, watch: &Watch) -> String {
     let predict = predict(networks, watch.side, watch.regions);
     format!("{predict} --watch {}", quoted(&watch.folder))
 }
 
-/// The judgement of the depth images that the command of [`ImageCommands`] writes.
+/// Returns the command that predicts from the depth images written by the command of [`ImageCommands`].
 pub(crate) fn of_prediction(networks: &Networks, side: Side, regions: [Roi; 2]) -> String {
     let predict = predict(networks, Some(side), regions);
     format!("printf 'depth_left.png\\tdepth_right.png\\n' | {predict} --stdin")
 }
 
-/// `ppa predict`, but for its frames.
+/// Returns `ppa predict` without its frames.
 fn predict(networks: &Networks, side: Option<Side>, regions: [Roi; 2]) -> String {
     let mut line = format!("ppa predict {}", quoted(&networks.left));
     if let Some(right) = &networks.right {
@@ -122,7 +122,7 @@ fn predict(networks: &Networks, side: Option<Side>, regions: [Roi; 2]) -> String
     line
 }
 
-/// The decisions of a case as a command.
+/// Returns the command that reproduces the decisions of a case.
 pub(crate) fn of_case(case: &Case, out: &Path) -> Commands {
     let mut line = format!("ppa prepare {}", quoted(&case.source.path));
     let _ = write!(line, " --side {}", case.side.letter());
@@ -226,7 +226,7 @@ fn of_choices(choices: &LandmarkOverrides) -> String {
     line
 }
 
-/// Images of the page as commands. `opened` is the plan that was opened, if any; `saved` is where a plan with the changes is saved;
+/// Returns the commands for the page's images. `opened` is the opened plan, if any; `saved` is the path for a plan with the changes;
 /// `seed` is that of the plan.
 pub(crate) fn of_images(
     case: &Path,
@@ -260,7 +260,7 @@ pub(crate) fn of_images(
         let _ = write!(exposure, " --seed {seed}");
     }
     let radiograph = format!("{exposure}{load} --out radiograph.png");
-    // Doses are those of a photon, whatever the tube load.
+    // Doses are per photon, independent of the tube load.
     let analog = format!("--engine analog --histories {}", dose::HISTORIES);
     let dose = format!("{exposure} {analog} --dose --out dose.png --json");
     ImageCommands {
@@ -272,7 +272,7 @@ pub(crate) fn of_images(
     }
 }
 
-/// Technique and beam.
+/// Returns the options for technique and beam.
 fn of_beam(what_if: &WhatIf) -> String {
     let mut line = String::new();
     if let Some(technique) = &what_if.technique {

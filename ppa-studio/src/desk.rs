@@ -1,4 +1,4 @@
-//! The limb as it is shown now, and the decisions that can be undone.
+//! The displayed limb and the undo history of its decisions.
 
 use std::sync::Arc;
 
@@ -10,11 +10,11 @@ use crate::error::StudioError;
 
 /// A limb with the decisions that led to it.
 pub(crate) struct Shown {
-    /// Counts changes; a later state has a higher number.
+    /// Number of the state; later states have higher numbers.
     pub revision: u64,
     pub case: Case,
     pub limb: VisibleLimb,
-    /// What is found where nobody chooses anything.
+    /// Landmarks found without manual choices.
     pub automatic: Option<Landmarks>,
 }
 
@@ -24,7 +24,7 @@ impl Shown {
     }
 }
 
-/// The limb that is shown, and the cases before and after it.
+/// The displayed limb, and the earlier and later cases for undo and redo.
 #[derive(Clone)]
 pub(crate) struct Desk {
     scan: Arc<LoadedScan>,
@@ -48,7 +48,7 @@ impl Desk {
         self.shown.clone()
     }
 
-    /// Changes the decisions. If nothing is found with them, everything stays as it was.
+    /// Changes the decisions. If the limb cannot be prepared with them, nothing changes.
     pub fn change(&mut self, case: Case) -> Result<(), StudioError> {
         if case == self.shown.case {
             return Ok(());
@@ -59,7 +59,7 @@ impl Desk {
         Ok(())
     }
 
-    /// Keeps the body around a point as a part of the limb, or removes it if it is kept.
+    /// Keeps the body around a point as part of the limb, or removes it if it was kept.
     ///
     /// # Errors
     /// [`StudioError::Prepare`] for a point in air or in the limb itself.
@@ -93,17 +93,17 @@ impl Desk {
         Ok(())
     }
 
-    /// Whether there is something to undo, and to redo.
+    /// Whether undo and redo are possible, in this order.
     pub fn can_step(&self) -> [bool; 2] {
         [!self.earlier.is_empty(), !self.later.is_empty()]
     }
 
-    /// Shows the limb of a case, and returns the case before.
+    /// Shows the limb of a case and returns the previous case.
     fn show(&mut self, case: Case) -> Result<Case, StudioError> {
         self.show_limb(case, None)
     }
 
-    /// As [`Self::show`], with the limb that was extracted for the case.
+    /// The same as [`Self::show`], with a limb already extracted for the case.
     fn show_limb(&mut self, case: Case, limb: Option<Arc<Limb>>) -> Result<Case, StudioError> {
         let revision = self.shown.revision + 1;
         let next = shown(&self.scan, case, revision, Some(&self.shown), limb)?;
@@ -140,7 +140,7 @@ fn shown(
     })
 }
 
-/// What is found of a limb of this kind where nobody chooses; nothing where that is not possible.
+/// Returns the landmarks found for a limb of this kind without manual choices; `None` if they are not found.
 fn automatic(scan: &LoadedScan, case: &Case, prepared: &PreparedLimb) -> Option<Landmarks> {
     let choices = LandmarkOverrides {
         limb: case.choices.limb,

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::Mesh;
 
-/// Side of the cells whose vertices become one, mm. A lower leg then has about 50,000 triangles.
+/// Side of the cells whose vertices are merged, mm. A lower leg then has about 50,000 triangles.
 const CELL_MM: f32 = 2.5;
 
-/// A mesh whose vertices within a cell of 2.5 mm are merged to their mean, and the means of values at its vertices.
+/// Merges the vertices within each cell of 2.5 mm to their mean. Returns the mesh and the means of the values at its vertices.
 pub(crate) fn display_mesh(skin: &Mesh, values: &[f32]) -> (Mesh, Vec<f32>) {
     let cell = |p: &Point3<f32>| [p.x, p.y, p.z].map(|x| (x / CELL_MM).floor() as i32);
     let mut merged = HashMap::new();
@@ -22,7 +22,7 @@ pub(crate) fn display_mesh(skin: &Mesh, values: &[f32]) -> (Mesh, Vec<f32>) {
         });
         let (position, direction, count) = &mut sums[index];
         *position += vertex.coords;
-        // Both faces of a sheet that is thinner than a cell become one, which is lit from either side.
+        // The two faces of a sheet thinner than a cell merge into one, which is lit from either side.
         *direction += if normal.dot(direction) < 0.0 {
             -normal
         } else {
@@ -52,8 +52,8 @@ pub(crate) fn display_mesh(skin: &Mesh, values: &[f32]) -> (Mesh, Vec<f32>) {
     (merged, means)
 }
 
-/// The mesh as little-endian bytes: counts of vertices and triangles (u32), positions and normals (f32), corners (u32), and values at
-/// the vertices (f32), if there are any.
+/// Returns the mesh as little-endian bytes: counts of vertices and triangles (u32), positions and normals (f32), corners (u32), and
+/// values at the vertices (f32), if any.
 pub(crate) fn bytes(mesh: &Mesh, values: &[f32]) -> Vec<u8> {
     let counts = [mesh.vertices.len() as u32, mesh.triangles.len() as u32];
     let positions = mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]);
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn merged_vertices_stay_within_a_cell_of_the_skin() {
-        // A sheet of squares of 1 mm.
+        // A sheet of 1 mm squares.
         let point = |n: u32| Point3::new((n % 40) as f32, (n / 40) as f32, 0.3);
         let corners = (0..39 * 39).map(|n| n % 39 + 40 * (n / 39));
         let skin = Mesh {

@@ -10,16 +10,16 @@ use serde::Serialize;
 use crate::error::StudioError;
 use crate::newest::Ticket;
 
-/// Histories that are followed.
+/// Number of simulated histories.
 pub(crate) const HISTORIES: u64 = 2_000_000;
 
 /// Absorbed dose in the part of the limb that radiographs are computed from.
 #[derive(Debug, Serialize)]
 pub(crate) struct DoseReport {
     histories: u64,
-    /// Photons per mAs, if the spectrum knows its fluence.
+    /// Photons per mAs, if the fluence of the spectrum is known.
     histories_per_mas: Option<f64>,
-    /// All voxels, with the air around the limb, then by matter without air.
+    /// Dose of all voxels, including the air around the limb, then of each kind of matter except air.
     matter: Vec<MatterDose>,
 }
 
@@ -33,7 +33,7 @@ struct MatterDose {
 }
 
 impl MatterDose {
-    /// Standard errors are added in quadrature: nearly all photons leave their energy in one of the mixtures.
+    /// Adds standard errors in quadrature: nearly all photons deposit their energy in one of the mixtures.
     fn new(name: &str, mixtures: &[Imparted]) -> Self {
         let sum = |of: fn(&Imparted) -> f64| mixtures.iter().map(of).sum::<f64>();
         let mut whole = mixtures[0];
@@ -50,7 +50,7 @@ impl MatterDose {
     }
 }
 
-/// Mixtures of the same materials belong together: their names differ after a comma.
+/// Groups mixtures of the same materials: their names differ only after a comma.
 fn by_matter(materials: &[(String, Imparted)]) -> Vec<(&str, Vec<Imparted>)> {
     let mut groups: Vec<(&str, Vec<Imparted>)> = Vec::new();
     for (name, imparted) in materials {
@@ -66,7 +66,7 @@ fn by_matter(materials: &[(String, Imparted)]) -> Vec<(&str, Vec<Imparted>)> {
     groups
 }
 
-/// Follows the histories, until a later request replaces this one.
+/// Simulates the histories until a later request replaces this one.
 pub(crate) fn absorbed_dose(
     limb: &ExposableLimb,
     angle_deg: f64,

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use crate::error::StudioError;
 use crate::token::Token;
 
-/// An address older than this is not used again.
+/// Maximum age of an address that is reused.
 const LIFETIME: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// A listening socket and the token that its page needs.
@@ -33,14 +33,14 @@ struct Last {
 }
 
 impl Endpoint {
-    /// Listens on an address of this machine. Port 0 is the port in the file `last` if that port is free, otherwise any free one.
+    /// Listens on an address of this machine. Port 0 means the port in the file `last` if it is free, otherwise any free port.
     ///
-    /// On the address and port in `last`, the token is that in the file, so that an open page continues. The file is
-    /// then written again, but for a studio that still runs there. It is used only in a folder that nobody else can read, and for a day;
-    /// without it every start has another token.
+    /// If address and port match `last`, the token in the file is reused, so that an open page continues. The file is then
+    /// rewritten, unless a studio still runs there. It is used for one day, and only in a folder that nobody else can read;
+    /// without it every start has a new token.
     ///
     /// # Errors
-    /// [`StudioError::Listen`] if the port is in use, [`StudioError::Random`] without random numbers.
+    /// [`StudioError::Listen`] if the port is in use, [`StudioError::Random`] if there are no random numbers.
     pub fn open(address: SocketAddr, last: Option<&Path>) -> Result<Self, StudioError> {
         let last = last.filter(|file| make_private_folder(file).is_ok());
         let known = last
@@ -51,7 +51,7 @@ impl Endpoint {
             let listener = TcpListener::bind((ip, port)).ok()?;
             Some(Self { listener, token })
         });
-        // The file is that of a studio which still runs.
+        // The file belongs to a studio that still runs.
         let is_taken = is_known && again.is_none();
         let listen = |source| StudioError::Listen { address, source };
         let endpoint = match again {
@@ -62,7 +62,7 @@ impl Endpoint {
             },
         };
         if let Some(file) = last.filter(|_| !is_taken) {
-            // A studio that cannot write it works all the same.
+            // The studio works without this file.
             let _ = endpoint.write(file);
         }
         Ok(endpoint)
@@ -78,8 +78,8 @@ impl Endpoint {
         Ok(write_whole(file, &serde_json::to_vec(&now)?)?)
     }
 
-    /// The file for what is opened at `path`, below the folder where a person's programs keep their state: `XDG_STATE_HOME`, or
-    /// `.local/state` in the home folder. None where neither is known.
+    /// Returns the file for the input opened at `path`, below the user's state folder: `XDG_STATE_HOME`, or `.local/state` in the
+    /// home folder. `None` if neither is known.
     pub fn file_of(path: &Path) -> Option<PathBuf> {
         let of = |name| std::env::var_os(name).map(PathBuf::from);
         let state = of("XDG_STATE_HOME").filter(|folder| folder.is_absolute());
@@ -91,17 +91,17 @@ impl Endpoint {
     }
 }
 
-/// What the file holds, unless it is old or not as it was written.
+/// Reads the file; `None` if it is too old or invalid.
 fn read(file: &Path) -> Option<Last> {
     let written = fs::metadata(file).ok()?.modified().ok()?;
-    // A time in the future has no age.
+    // A time in the future is an error.
     if written.elapsed().ok()? > LIFETIME {
         return None;
     }
     serde_json::from_slice(&fs::read(file).ok()?).ok()
 }
 
-/// Makes the folder of a file, which only its owner may read.
+/// Makes the folder of a file, readable by its owner only.
 #[cfg(unix)]
 fn make_private_folder(file: &Path) -> io::Result<()> {
     use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
@@ -115,7 +115,7 @@ fn make_private_folder(file: &Path) -> io::Result<()> {
     }
 }
 
-/// Where no folder can be made private, no token is kept.
+/// Always fails: no folder can be made private here, so no token is stored.
 #[cfg(not(unix))]
 fn make_private_folder(_: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())

@@ -1,4 +1,4 @@
-//! Why the studio cannot be opened, or cannot do what the page asks for.
+//! Errors of opening the studio and of requests from its page.
 
 use std::path::PathBuf;
 
@@ -10,23 +10,23 @@ use ppa_generate::{
 };
 use ppa_report::ContactSheetError;
 
-/// Why the studio cannot be opened, or cannot do what the page asks for.
+/// Error of opening the studio or of a request from its page.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StudioError {
     /// A scan was given without the side of the limb.
     #[error("{} is a scan: give the side of its limb, --side l or --side r", .0.display())]
     NoSide(PathBuf),
-    /// A plan names no case.
+    /// The plan names no case.
     #[error("{} does not specify a case", .0.display())]
     NoCase(PathBuf),
-    /// Frames are to be judged without networks.
+    /// Frames are watched, but there are no networks.
     #[error("frames are watched, but no networks are given to judge them")]
     NoNetworks,
-    /// A dataset, trainings or frames are open, but no limb.
+    /// A dataset, training runs or frames are open, but no limb.
     #[error("no limb is open")]
     NoLimb,
-    /// A limb whose case is not known.
+    /// The plan names no case for a limb.
     #[error("the plan next to the dataset has no case for {0}")]
     NotInPlan(LimbId),
     /// The quality report of a dataset.
@@ -50,19 +50,19 @@ pub enum StudioError {
     /// A reader's grades.
     #[error(transparent)]
     Grades(#[from] ppa_label::GradeSheetError),
-    /// Labels of readers' grades.
+    /// Labels computed from readers' grades.
     #[error(transparent)]
     Import(#[from] ppa_label::ImportError),
     /// Networks that cannot be used.
     #[error(transparent)]
     Network(#[from] ppa_learn::frames::FramesError),
-    /// A training, or the images of its evaluation.
+    /// A training run, or the images of its evaluation.
     #[error(transparent)]
     Train(#[from] ppa_learn::train::TrainError),
-    /// An image of a training.
+    /// An image of a training run.
     #[error(transparent)]
     TrainingData(#[from] ppa_learn::data::DataError),
-    /// The evaluation of a training.
+    /// The evaluation of a training run.
     #[error(transparent)]
     Evaluate(#[from] ppa_learn::evaluate::EvaluateError),
     /// The built-in phantom.
@@ -80,13 +80,13 @@ pub enum StudioError {
     /// Room, table, cameras or beam.
     #[error(transparent)]
     Scene(#[from] SceneSetupError),
-    /// What the cameras see of the joint.
+    /// The cameras' coverage of the joint.
     #[error(transparent)]
     Coverage(#[from] ppa_generate::CoverageStudyError),
     /// The pose.
     #[error(transparent)]
     Pose(#[from] PoseError),
-    /// Where the limb rests.
+    /// The placement of the limb.
     #[error(transparent)]
     Place(#[from] ppa_scene::PlaceError),
     /// Voxels for the radiograph.
@@ -95,34 +95,34 @@ pub enum StudioError {
     /// The radiograph.
     #[error(transparent)]
     Transport(#[from] ppa_xray::TransportError),
-    /// Its histories.
+    /// The histories of the radiograph.
     #[error(transparent)]
     Run(#[from] ppa_xray::RunError),
-    /// Its doses.
+    /// The doses of the radiograph.
     #[error(transparent)]
     Dose(#[from] ppa_xray::DoseError),
-    /// Its presentation.
+    /// The presentation of the radiograph.
     #[error(transparent)]
     Presentation(#[from] ppa_xray::PresentationError),
-    /// Its exposure index.
+    /// The exposure index of the radiograph.
     #[error(transparent)]
     Receptor(#[from] ppa_xray::ReceptorError),
     /// The bones of the case.
     #[error(transparent)]
     Bones(#[from] ppa_label::BoneFileError),
-    /// Their joint space.
+    /// The joint space of the bones.
     #[error(transparent)]
     JointSpace(#[from] ppa_label::JointSpaceError),
     /// The coarse scan.
     #[error(transparent)]
     Volume(#[from] ppa_ct::VolumeError),
-    /// Its surface.
+    /// The surface of the coarse scan.
     #[error(transparent)]
     Surface(#[from] ppa_mesh::SurfaceError),
     /// The text of a plan.
     #[error("the plan is not valid TOML")]
     Toml(#[source] toml::de::Error),
-    /// The text of a plan, to be changed.
+    /// The text of a plan that is edited.
     #[error(transparent)]
     TomlEdit(#[from] toml_edit::TomlError),
     /// A file.
@@ -131,7 +131,7 @@ pub enum StudioError {
     /// The folder of a dataset.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The folder of the jobs of a cluster.
+    /// The folder of cluster jobs.
     #[error(transparent)]
     Cluster(#[from] ppa_cluster::FolderError),
     /// The forecast of a plan.
@@ -140,7 +140,7 @@ pub enum StudioError {
     /// The contact sheet of a dataset.
     #[error(transparent)]
     ContactSheet(#[from] ContactSheetError),
-    /// A run is under way.
+    /// A dataset is already being made.
     #[error("{} is being made: pause it first", .0.display())]
     Generating(PathBuf),
     /// Threads for a run.
@@ -152,13 +152,13 @@ pub enum StudioError {
     /// A value that the page sent.
     #[error("{0}")]
     Invalid(String),
-    /// The file with the changes was written by someone else.
+    /// Another program changed the file with the changes.
     #[error("{} was changed by another program: nothing was saved", .0.display())]
     ChangedElsewhere(PathBuf),
-    /// A file that the person has not agreed to replace.
+    /// A file that the user has not agreed to replace.
     #[error("{} exists", .0.display())]
     Exists(PathBuf),
-    /// A dataset without the list of its images.
+    /// A dataset has no list of its images.
     #[error(
         "{} is not a complete dataset: manifest.jsonl is missing, which is written when all images are made",
         .0.display()
@@ -167,7 +167,7 @@ pub enum StudioError {
     /// A later request of the page has replaced this one.
     #[error("a later request replaced this one")]
     Superseded,
-    /// Random bytes for the address.
+    /// Random bytes for the token.
     #[error("the operating system does not provide random numbers: {0}")]
     Random(getrandom::Error),
     /// The address cannot be used.
@@ -175,7 +175,7 @@ pub enum StudioError {
     Listen {
         /// The address.
         address: std::net::SocketAddr,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The listening socket.

@@ -4,14 +4,14 @@ use image::{Rgb, RgbImage};
 use ppa_dataset::published::GrayImage16;
 use ppa_depth::{DepthImage, false_colour};
 
-/// Length of the range of depths that the colours span, mm: enough for a limb on its table.
+/// Depth range of the colours, mm: enough for a limb on its table.
 const COLOURED_MM: f64 = 350.0;
 
-/// Depths in rows.
+/// Image of depths in row order.
 pub(crate) trait Depths {
     fn size(&self) -> [u32; 2];
 
-    /// Depth of a pixel, mm; 0 where there is none.
+    /// Returns the depth of a pixel, mm; 0 if there is none.
     fn depth_mm(&self, pixel: usize) -> f64;
 }
 
@@ -35,7 +35,7 @@ impl Depths for GrayImage16 {
     }
 }
 
-/// All images in one picture, the first at the left, and the range of depths that its colours span, mm: from the nearest on.
+/// Returns all images in one picture, the first at the left, and the depth range of its colours, mm, which begins at the nearest depth.
 pub(crate) fn side_by_side(images: &[impl Depths]) -> (RgbImage, [f64; 2]) {
     let range_mm = range_mm(images);
     let sizes = images.iter().map(Depths::size);

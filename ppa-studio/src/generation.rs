@@ -1,4 +1,4 @@
-//! The generation of a dataset, while the page remains usable.
+//! Generation of a dataset while the page remains usable.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::error::StudioError;
 
-/// The run that this program has begun last, if any.
+/// The last run that this program has started, if any.
 #[derive(Default)]
 pub(crate) struct Generation(Mutex<Option<Run>>);
 
@@ -33,18 +33,18 @@ struct Shared {
     outcome: Mutex<Option<Result<(), GenerateError>>>,
 }
 
-/// Where the generation of a dataset stands.
+/// Phase of the generation of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Phase {
     /// The folder holds no dataset.
     Absent,
     Running,
-    /// The poses under way are finished, no other begins.
+    /// The current poses are being finished; no other begins.
     Stopping,
-    /// Another program makes it.
+    /// Another program makes the dataset.
     Elsewhere,
-    /// Poses are missing; going on makes them.
+    /// Poses are missing; resuming makes them.
     Paused,
     Complete,
     Failed,
@@ -56,7 +56,7 @@ pub(crate) struct GenerationState {
     pub phase: Phase,
     pub pose_jobs: usize,
     pub made: usize,
-    /// Poses that this run has made, and its time so far: what remains can be estimated.
+    /// Poses that this run has made. With `elapsed_s`, it allows an estimate of the remaining time.
     pub made_now: usize,
     pub elapsed_s: f64,
     pub limbs: Vec<LimbId>,
@@ -65,10 +65,10 @@ pub(crate) struct GenerationState {
 }
 
 impl Generation {
-    /// Makes what is missing of the dataset of a plan.
+    /// Starts to make the missing part of a plan's dataset.
     ///
     /// # Errors
-    /// [`StudioError::Generating`] while a run is under way, and what keeps the run from beginning.
+    /// [`StudioError::Generating`] while another run continues, or the error that prevents the start.
     pub fn start(&self, plan: Arc<Plan>, root: PathBuf) -> Result<(), StudioError> {
         let mut kept = self.run();
         if let Some(run) = &*kept
@@ -98,24 +98,24 @@ impl Generation {
         Ok(())
     }
 
-    /// Ends the run after the poses under way.
+    /// Ends the run after the current poses.
     pub fn pause(&self) {
         if let Some(run) = &*self.run() {
             run.shared.stop.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Ends the run and waits for the poses under way.
+    /// Ends the run and waits for the current poses.
     pub fn finish(&self) {
         self.pause();
         let run = self.run().take();
         if let Some(run) = run {
-            // A run that panicked has no outcome, and its files are those of a killed one.
+            // A run that panicked has no outcome and leaves the files of a killed one.
             let _ = run.thread.join();
         }
     }
 
-    /// State of the dataset in a folder: of the run while it is under way, else by the files.
+    /// Returns the state of the dataset in a folder, from the active run or otherwise from the files.
     pub fn state(&self, root: &Path) -> Result<GenerationState, StudioError> {
         let mut error = None;
         let mut failed = false;
@@ -213,7 +213,7 @@ impl Shared {
     }
 }
 
-/// Threads for long work: images for the page do not wait for it.
+/// Makes a thread pool for long work, so that images for the page do not wait for it.
 pub(crate) fn own_threads() -> Result<ThreadPool, StudioError> {
     let threads = ThreadPoolBuilder::new().build();
     threads.map_err(StudioError::Threads)

@@ -1,4 +1,4 @@
-//! Who may use the page: a browser that was given the address, by localhost or an IP address, from the page itself.
+//! Access control: only browsers that know the token may use the page, via localhost or an IP address, from the page itself.
 
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use axum::response::{IntoResponse, Response};
 use crate::state::State;
 use crate::token::Token;
 
-/// What the page may load: only what this program serves, no inline script or style.
+/// Content security policy: the page may load only what this program serves, no inline script or style.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -28,10 +28,10 @@ const HEADERS: [(HeaderName, &str); 4] = [
     (CACHE_CONTROL, "no-store"),
 ];
 
-/// Header by which a page notices that the program has been started again.
+/// Header that tells a page that the program has restarted.
 const STARTED: HeaderName = HeaderName::from_static("x-started");
 
-/// Refuses requests of others, exchanges the token for a cookie, and adds the headers that protect the page.
+/// Refuses unauthorised requests, exchanges the token for a cookie, and adds the headers that protect the page.
 pub(crate) async fn guard(
     Extracted(state): Extracted<Arc<State>>,
     request: Request,
@@ -53,26 +53,26 @@ pub(crate) async fn guard(
     response
 }
 
-/// When the program started, in a number that no other start has.
+/// Returns the start time of the program in nanoseconds, which identifies the start.
 fn start(state: &State) -> HeaderValue {
     let since = state.started.duration_since(UNIX_EPOCH);
     HeaderValue::from(since.unwrap_or_default().as_nanos() as u64)
 }
 
-/// Who sends a request.
+/// The sender of a request.
 enum Judged {
     /// A browser with the cookie.
     Known,
-    /// A browser that opens the address with the token.
+    /// A browser that opens the address including the token.
     Enters,
-    /// Somebody else, with the reason.
+    /// Anybody else, with the reason for the refusal.
     Refused(&'static str),
 }
 
 fn judged(token: &Token, request: &Request) -> Judged {
     let headers = request.headers();
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    // A name that resolves to this machine may belong to a page of somebody else (DNS rebinding).
+    // A host name that resolves to this machine may belong to another party's page (DNS rebinding).
     let host = text(HOST).unwrap_or_default();
     if !is_localhost_or_ip(host) {
         return Judged::Refused(
@@ -97,7 +97,7 @@ fn judged(token: &Token, request: &Request) -> Judged {
     )
 }
 
-/// Whether a Host header is localhost or an IP address, for which nobody else's name server can answer; the port may be that of a forwarding.
+/// Whether a Host header is localhost or an IP address, which no other party's name server resolves; the port may be a forwarded one.
 fn is_localhost_or_ip(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
@@ -121,7 +121,7 @@ fn has_cookie(headers: &HeaderMap, token: &Token) -> bool {
         .any(|(key, value)| key == name && token.is(value))
 }
 
-/// Gives the cookie, and leads to the page without the token in its address.
+/// Sets the cookie and redirects to the address without the token.
 fn admit(token: &Token) -> Response {
     let cookie = format!(
         "{}={}; HttpOnly; SameSite=Strict; Path=/",

@@ -1,4 +1,4 @@
-//! The limb that is open: its decisions, its files, and what its images share.
+//! The open limb: its decisions, its files, and the data that its images share.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,19 +12,19 @@ use crate::error::StudioError;
 use crate::pose_label::Labels;
 use crate::scene::Scenes;
 
-/// The limb that is open.
+/// The open limb.
 pub(crate) struct Limb {
     pub scenes: Scenes,
     pub coarse: CoarseScan,
     pub labels: Labels,
-    /// Front of the mortise, `ct` frame, where it is known: that of the built-in phantom.
+    /// Front of the mortise, `ct` frame; known for the built-in phantom only.
     pub mortise: Option<[f64; 3]>,
     desk: Mutex<Desk>,
     case_file: Mutex<CaseFile>,
 }
 
 impl Limb {
-    /// Opens a case with the changes that were saved beside its file, which need not exist yet.
+    /// Opens a case and restores the changes saved next to its file, which need not exist yet.
     pub fn open(file: PathBuf, case: Case) -> Result<Self, StudioError> {
         let case_file = CaseFile::new(file);
         let case = if case_file.has_edits() {
@@ -58,14 +58,14 @@ impl Limb {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes what is shown and saves it beside the case. What cannot be saved is not shown either.
+    /// Changes the displayed limb and saves it next to the case. A change that cannot be saved is not shown.
     pub fn edit(
         &self,
         change: impl FnOnce(&mut Desk) -> Result<(), StudioError>,
     ) -> Result<(), StudioError> {
         let mut desk = self.desk();
         let before = desk.clone();
-        // All of it is of the limb before; the next one needs the memory.
+        // These belong to the previous limb; the next one needs the memory.
         self.scenes.forget_limb();
         self.labels.forget_limb();
         change(&mut desk)?;
@@ -80,17 +80,17 @@ impl Limb {
         saved
     }
 
-    /// Where a plan with changes is saved: beside the case.
+    /// Returns the path for a plan with changes, next to the case.
     pub fn saved_plan(&self) -> PathBuf {
         self.case_file().plan()
     }
 
-    /// Where moved cameras are saved: beside the case.
+    /// Returns the path for moved cameras, next to the case.
     pub fn saved_cameras(&self) -> PathBuf {
         self.case_file().cameras()
     }
 
-    /// The file that holds the case as it is shown.
+    /// Returns the file that holds the displayed case.
     pub fn case_on_disk(&self) -> PathBuf {
         let file = self.case_file();
         let path: &Path = if file.has_edits() {

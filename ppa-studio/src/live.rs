@@ -1,4 +1,4 @@
-//! Predictions of networks for the frames that a recorder writes into a folder.
+//! Network predictions for the frames that a recorder writes into a folder.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,18 +19,18 @@ use crate::png::png;
 /// Colour of the square around the joint.
 const REGION: Rgb<u8> = Rgb([255, 255, 255]);
 
-/// Frames to judge as they come, as `ppa predict --watch` takes them.
+/// Frames to predict from as they arrive, as in `ppa predict --watch`.
 #[derive(Debug, Clone)]
 pub struct Watch {
     /// Folder of the frames of both cameras.
     pub folder: PathBuf,
-    /// Where the left and the right camera's frames show the joint.
+    /// Regions of the joint in the left and the right camera's frames.
     pub regions: [Roi; 2],
-    /// Side of the limb; networks that were trained with `mirror` need it.
+    /// Side of the limb, required by networks trained with `mirror`.
     pub side: Option<Side>,
 }
 
-/// A folder whose newest pair of frames is judged.
+/// A watched folder and the predictor for its newest pair of frames.
 pub(crate) struct Live {
     pub networks: Networks,
     pub watch: Watch,
@@ -40,17 +40,17 @@ pub(crate) struct Live {
 
 struct Watched {
     folder: PairFolder,
-    /// Pairs so far.
+    /// Number of pairs found so far.
     found: u64,
     shown: Option<Arc<LivePair>>,
 }
 
-/// The newest pair, judged.
+/// The newest pair with its prediction.
 pub(crate) struct LivePair {
     pub report: LiveReport,
-    /// When the later frame was written, as its file says.
+    /// Modification time of the later frame's file.
     written: SystemTime,
-    /// When both were found.
+    /// Time at which both frames were found.
     found: Instant,
     /// Both frames in false colour with the squares around the joint, PNG; empty if one cannot be read.
     pub png: Vec<u8>,
@@ -60,7 +60,7 @@ pub(crate) struct LivePair {
 pub(crate) struct LiveReport {
     /// Number of the pair among those found so far, from 1.
     pub number: u64,
-    /// What the names of both frames have in common.
+    /// The common part of both frames' names.
     pub name: String,
     /// Time from finding the complete pair to the answer.
     pub latency_ms: f64,
@@ -68,7 +68,7 @@ pub(crate) struct LiveReport {
 }
 
 impl LivePair {
-    /// Age of the frames, seconds; at least the time since they were found, in case the clock that dated them is ahead.
+    /// Returns the age of the frames, seconds; at least the time since they were found, in case the clock of their files is ahead.
     pub fn age_s(&self) -> f64 {
         let written = SystemTime::now().duration_since(self.written);
         let since = written.unwrap_or_default().max(self.found.elapsed());
@@ -80,10 +80,10 @@ impl Live {
     /// Opens the networks for a folder, which need not have frames yet.
     ///
     /// # Errors
-    /// [`StudioError`] naming the training or the folder that cannot be used.
+    /// [`StudioError`] naming the training run or the folder that cannot be used.
     pub fn open(networks: &Networks, watch: Watch) -> Result<Self, StudioError> {
         let predictor = networks.predictor(watch.regions, watch.side)?;
-        // Refused now, not at the first request.
+        // Fails now rather than at the first request.
         std::fs::read_dir(&watch.folder).map_err(FileError::at("read", &watch.folder))?;
         let watched = Watched {
             folder: PairFolder::new(&watch.folder),
@@ -98,7 +98,7 @@ impl Live {
         })
     }
 
-    /// The newest pair if its number is above `after`. Older pairs that came with it are skipped.
+    /// Returns the newest pair if its number is above `after`. Older pairs found with it are skipped.
     pub fn newest(&self, after: u64) -> Result<Option<Arc<LivePair>>, StudioError> {
         let (pair, number) = {
             let mut watched = self.watched();
@@ -106,7 +106,7 @@ impl Live {
             watched.found += found.len() as u64;
             (found.into_iter().next_back(), watched.found)
         };
-        // Judged without the lock, so that another page may look meanwhile.
+        // Predicts without the lock, so that another page can ask meanwhile.
         let judged = pair.map(|pair| Arc::new(self.judge(pair, number)));
         let mut watched = self.watched();
         if let Some(judged) = judged
@@ -147,7 +147,7 @@ impl Live {
         }
     }
 
-    /// `None` if a frame cannot be read: the answer says why.
+    /// Returns `None` if a frame cannot be read; the answer gives the reason.
     fn picture(&self, pair: &FramePair) -> Option<Vec<u8>> {
         let [left, right] = pair
             .files
@@ -162,7 +162,7 @@ impl Live {
     }
 }
 
-/// The border of a region in the image that begins at a column of the picture.
+/// Draws the border of a region in the image that begins at column `left` of the picture.
 fn draw_square(picture: &mut RgbImage, region: &Roi, left: u32) {
     let [x, y] = [left.saturating_add(region.x_start), region.y_start];
     let last = region.size.saturating_sub(1);

@@ -1,4 +1,4 @@
-//! Predictions of trained networks for the pose that is shown.
+//! Predictions of trained networks for the displayed pose.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::error::StudioError;
 
-/// Replaced by those of each pose.
+/// Placeholder, replaced by the regions of each pose.
 const NO_REGIONS: [Roi; 2] = [Roi {
     x_start: 0,
     y_start: 0,
@@ -23,28 +23,28 @@ const NO_REGIONS: [Roi; 2] = [Roi {
 /// The networks of both cameras, as `ppa predict` takes them.
 #[derive(Debug, Clone, Default)]
 pub struct Networks {
-    /// Folder of the finished training of the left camera's network, or of one network of both cameras.
+    /// Folder of the finished training run of the left camera's network, or of one network for both cameras.
     pub left: PathBuf,
-    /// Folder of the right camera's network, if it has one of its own.
+    /// Folder of the right camera's network, if it is a separate one.
     pub right: Option<PathBuf>,
-    /// File of `ppa calibrate` for these networks.
+    /// File written by `ppa calibrate` for these networks.
     pub confidence: Option<PathBuf>,
 }
 
-/// Networks that are open.
+/// The open networks.
 pub(crate) struct Network {
     pub networks: Networks,
-    /// Those for limbs of a side.
+    /// Predictor for limbs of one side.
     kept: Mutex<(Side, Arc<PairPredictor>)>,
 }
 
-/// An answer of networks.
+/// Answer of the networks.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum NetworkAnswer {
-    /// What they say.
+    /// Their prediction.
     Prediction(PairPrediction),
-    /// Why they say nothing.
+    /// Reason why there is no prediction.
     Refused(String),
 }
 
@@ -52,14 +52,14 @@ impl Network {
     /// Opens networks.
     ///
     /// # Errors
-    /// [`StudioError::Network`] naming the training that cannot be used.
+    /// [`StudioError::Network`] naming the training run that cannot be used.
     pub fn open(networks: Networks) -> Result<Self, StudioError> {
         let side = Side::Right;
         let kept = Mutex::new((side, Arc::new(networks.predictor(NO_REGIONS, Some(side))?)));
         Ok(Self { networks, kept })
     }
 
-    /// What they say of the depth images of a limb, left camera first.
+    /// Predicts from the depth images of a limb, left camera first.
     pub fn answer(&self, side: Side, views: &[DepthView]) -> NetworkAnswer {
         let [left, right] = views else {
             return NetworkAnswer::Refused(format!("{} cameras, expected two", views.len()));
@@ -90,7 +90,7 @@ impl Network {
 }
 
 impl Networks {
-    /// The networks for frames of a limb that show the joint in these regions of the left and the right camera.
+    /// Opens the networks for frames that show the joint in these regions of the left and the right camera.
     pub(crate) fn predictor(
         &self,
         regions: [Roi; 2],
@@ -105,7 +105,7 @@ impl Networks {
     }
 }
 
-/// A depth image in whole millimetres, as in the files that networks are trained with.
+/// Returns a depth image in whole millimetres, as in the files used for training.
 fn raster(view: &DepthView) -> Result<Raster<u16>, FramesError> {
     let rounded = view.image.to_u16();
     let (width, height) = (rounded.width as usize, rounded.height as usize);

@@ -1,11 +1,11 @@
-//! Requests of which only the newest counts: no queue builds up behind a slider.
+//! Requests of which only the newest is served, so that no queue builds up behind a slider.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::StudioError;
 
-/// One kind of work, done for one request at a time, and only for the newest.
+/// One kind of work, done for one request at a time and only for the newest.
 #[derive(Default)]
 pub(crate) struct Newest {
     latest: Arc<AtomicU64>,
@@ -28,15 +28,15 @@ impl Newest {
         }
     }
 
-    /// Ends the work that is under way, without a request for other work.
+    /// Ends the current work without requesting other work.
     pub fn cancel(&self) {
         self.enter();
     }
 
-    /// Waits for the work under way.
+    /// Waits for the current work.
     ///
     /// # Errors
-    /// [`StudioError::Superseded`] if a later request has arrived meanwhile.
+    /// [`StudioError::Superseded`] if a later request has arrived.
     pub fn turn(&self, ticket: &Ticket) -> Result<MutexGuard<'_, ()>, StudioError> {
         let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
         if ticket.is_newest() {
@@ -51,7 +51,7 @@ impl Ticket {
         self.latest.load(Ordering::SeqCst) == self.number
     }
 
-    /// Ends this request's work, unless a later request has done so.
+    /// Ends this request's work, unless a later request has already done so.
     pub fn cancel(&self) {
         let _ = self.latest.compare_exchange(
             self.number,
@@ -62,7 +62,7 @@ impl Ticket {
     }
 }
 
-/// Ends the work of a request whose answer nobody waits for any more.
+/// Ends the work of a request when nobody waits for its answer any more.
 pub(crate) struct CancelOnDrop(pub Ticket);
 
 impl Drop for CancelOnDrop {

@@ -1,4 +1,4 @@
-//! What the studio opens: a scan, a case, a plan, a dataset, trainings, or the built-in phantom.
+//! Input of the studio: a scan, a case, a plan, a dataset, training runs, or the built-in phantom.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -17,27 +17,27 @@ use crate::live::Watch;
 use crate::network::Networks;
 use crate::trainings::Trainings;
 
-/// What to open.
+/// Input to open.
 #[derive(Debug, Clone, Default)]
 pub struct Opening {
-    /// A scan, a case, a plan, a dataset, a training or a folder of trainings; the built-in phantom when absent, unless frames are watched.
+    /// A scan, case, plan, dataset, training run or folder of training runs. If absent, the built-in phantom, unless frames are watched.
     pub path: Option<PathBuf>,
     /// Side of the limb in a scan.
     pub side: Option<Side>,
-    /// Networks that judge the poses.
+    /// Networks that predict the quality of poses.
     pub networks: Option<Networks>,
-    /// Frames that the networks judge as they come.
+    /// Frames that the networks predict from as they arrive.
     pub watch: Option<Watch>,
 }
 
-/// Folder of the phantom that is opened when nothing is given, in the current one.
+/// Folder, in the current one, of the phantom that is opened by default.
 const PHANTOM_FOLDER: &str = "ppa-studio";
 
-/// Side of the phantom's voxels, mm.
+/// Voxel size of the phantom, mm.
 const PHANTOM_SPACING_MM: f64 = 1.0;
 
 impl Opening {
-    /// What is at a path.
+    /// Returns the opening of a path, without other options.
     pub fn of(path: &Path) -> Self {
         Self {
             path: Some(path.to_owned()),
@@ -45,7 +45,7 @@ impl Opening {
         }
     }
 
-    /// What is to be shown first.
+    /// Reads the input that is shown first.
     pub(crate) fn read(&self) -> Result<Opened, StudioError> {
         let Some(path) = &self.path else {
             return match self.watch {
@@ -98,15 +98,15 @@ impl Opening {
     }
 }
 
-/// What was opened.
+/// The opened input.
 #[derive(Default)]
 pub(crate) struct Opened {
-    /// A case, and the file that it is or will be written to.
+    /// A case, and its file, which need not exist yet.
     pub limb: Option<(PathBuf, Case)>,
     pub plan_file: Option<PathBuf>,
     pub dataset: Option<PathBuf>,
     pub trainings: Option<Trainings>,
-    /// Why landmarks have to be set by hand.
+    /// Why landmarks must be set by hand.
     pub note: Option<String>,
     /// Front of the mortise of the built-in phantom, `ct` frame.
     pub mortise: Option<[f64; 3]>,
@@ -132,7 +132,7 @@ fn of_plan(path: &Path) -> Result<Opened, StudioError> {
     })
 }
 
-/// A new case; where landmarks are not found, one whose landmarks are set by hand, and why.
+/// Makes a case from a scan. If landmarks are not found, they must be set by hand, and the reason is returned.
 fn case_of_scan(path: &Path, side: Side) -> Result<(Case, Option<String>), StudioError> {
     let reading = ReadOptions::default();
     let scan = ppa_ct::read_with(path, &reading).map_err(PrepareError::from)?;
@@ -150,11 +150,11 @@ fn case_of_scan(path: &Path, side: Side) -> Result<(Case, Option<String>), Studi
     }
 }
 
-/// A dataset, and the plan that it has the name of, which may be there.
+/// Returns a dataset and the path of the plan with the same name, which may not exist.
 fn of_dataset(path: &Path) -> Result<Opened, StudioError> {
     let root = match path.file_name() {
         Some(_) => path.to_owned(),
-        // As `.`.
+        // Such as `.`.
         None => path.canonicalize().map_err(FileError::at("find", path))?,
     };
     let mut name = root.file_name().unwrap_or_default().to_owned();
@@ -171,14 +171,14 @@ fn is_plan(path: &Path) -> bool {
     std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|l| l.trim() == "[[case]]"))
 }
 
-/// The case of a scan, in the current folder.
+/// Returns the case file of a scan, in the current folder.
 fn case_name(scan: &Path) -> PathBuf {
     let name = scan.file_name().unwrap_or_default().to_string_lossy();
     let stem = name.split('.').find(|part| !part.is_empty());
     PathBuf::from(format!("{}.case.toml", stem.unwrap_or("scan")))
 }
 
-/// The built-in phantom, its bones and its case, written unless they are there.
+/// Returns the case file of the built-in phantom. Writes it with scan and bones if it does not exist.
 fn phantom() -> Result<PathBuf, StudioError> {
     let folder = Path::new(PHANTOM_FOLDER);
     let case_file = folder.join("p01.case.toml");
@@ -199,7 +199,7 @@ fn phantom() -> Result<PathBuf, StudioError> {
     Ok(case_file)
 }
 
-/// Writes the phantom's scan and which bone each of its voxels belongs to.
+/// Writes the phantom's scan and the bone number of each voxel.
 fn phantom_scan(folder: &Path) -> Result<(PathBuf, PathBuf), Box<dyn Error + Send + Sync>> {
     let (scan, bones) = (folder.join("p01.nii.gz"), folder.join("p01.bones.nii.gz"));
     std::fs::create_dir_all(folder)?;

@@ -1,4 +1,4 @@
-//! Cameras that are written out in a plan.
+//! Cameras written out in a plan.
 
 use ppa_depth::RigSpec;
 use toml::Value;
@@ -6,20 +6,20 @@ use toml_edit::{DocumentMut, Item, Table};
 
 use crate::toml_value::{implicit, put};
 
-/// The table of the plan that holds them.
+/// Table of the cameras in a plan.
 pub(crate) const CAMERAS: &str = "depth.cameras";
 
-/// A rig as the plan holds it.
+/// Returns a rig as a value of the plan.
 pub(crate) fn rig_value(rig: &RigSpec) -> Value {
     Value::try_from(rig).expect("names and numbers are TOML")
 }
 
-/// The key within the table of cameras; `None` for other keys of a plan.
+/// Returns the key within the table of cameras; `None` for other keys of a plan.
 pub(crate) fn within_cameras(key: &str) -> Option<&str> {
     key.strip_prefix(CAMERAS)?.strip_prefix('.')
 }
 
-/// A rig in which a key of the table was left out, as the types read it; `None` where they require the key.
+/// Returns the default rig as it is read without a key of the table; `None` if the key is required.
 pub(crate) fn rig_without(key: &str) -> Option<Value> {
     let mut rig = rig_value(&RigSpec::default());
     let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
@@ -30,13 +30,13 @@ pub(crate) fn rig_without(key: &str) -> Option<Value> {
     Some(rig_value(&rig))
 }
 
-/// Whether the table is in the file.
+/// Whether the file has the table of cameras.
 pub(crate) fn has_cameras(document: &DocumentMut) -> bool {
     let depth = document.get("depth").and_then(Item::as_table_like);
     depth.is_some_and(|depth| depth.contains_key("cameras"))
 }
 
-/// Puts a rig into the plan in place of the name of its file; `None` where `depth` is no table.
+/// Writes a rig into the plan and removes the name of its file; `None` if `depth` is not a table.
 pub(crate) fn write_out(document: &mut DocumentMut, rig: &RigSpec) -> Option<()> {
     put(document.as_table_mut(), "depth.rig", None)?;
     let depth = document.entry("depth").or_insert(Item::Table(implicit()));
@@ -52,7 +52,7 @@ fn table_of(values: &toml::Table) -> Table {
     let mut table = implicit();
     for (key, value) in values {
         let item = match value {
-            // Figures of a mask are short.
+            // The numbers of a mask fit on one line.
             Value::Table(values) if key != "mask" => Item::Table(table_of(values)),
             value => Item::Value(rows(value).parse().expect("what was just written")),
         };
@@ -61,7 +61,7 @@ fn table_of(values: &toml::Table) -> Table {
     table
 }
 
-/// A value as TOML, with the rows of a matrix below each other.
+/// Formats a value as TOML, with one line per row of a matrix.
 pub(crate) fn rows(value: &Value) -> String {
     match value.as_array() {
         Some(rows) if rows.iter().all(Value::is_array) && !rows.is_empty() => {

@@ -12,19 +12,19 @@ use crate::plan_form::{FieldKind, kind_of, table_instead_of};
 use crate::plan_limbs::LimbChange;
 use crate::toml_value::put;
 
-/// Where a plan stands, and where its changes are saved as they are made.
+/// A plan file, the file for its changes, which are saved as they are made, and the undo history.
 pub(crate) struct PlanFile {
     original: PathBuf,
     edited: PathBuf,
-    /// The edited file as this program knows it; `None` while there is none.
+    /// Text of the edited file as last read or saved by this program; `None` if there is none.
     known: Option<String>,
-    /// Texts before and after this one, to undo and redo changes.
+    /// Earlier texts, for undo; `later` has those for redo.
     earlier: Vec<String>,
     later: Vec<String>,
 }
 
 impl PlanFile {
-    /// `plan.toml`, whose changes go to `plan.edited.toml`.
+    /// Returns the files of a plan. Changes of `plan.toml` go to `plan.edited.toml`.
     pub fn new(original: PathBuf) -> Self {
         let edited = original.with_extension("edited.toml");
         let known = std::fs::read_to_string(&edited).ok();
@@ -41,7 +41,7 @@ impl PlanFile {
         &self.original
     }
 
-    /// The file that holds the plan as it is shown.
+    /// Returns the file that holds the displayed plan.
     pub fn current(&self) -> &Path {
         if self.has_edits() {
             &self.edited
@@ -50,12 +50,12 @@ impl PlanFile {
         }
     }
 
-    /// Whether changes are saved beside the original.
+    /// Whether changes are saved next to the original.
     pub fn has_edits(&self) -> bool {
         self.known.is_some()
     }
 
-    /// The folder that its datasets are in.
+    /// Returns the folder of the plan and its datasets.
     pub fn folder(&self) -> &Path {
         let parent = self.original.parent();
         parent
@@ -63,7 +63,7 @@ impl PlanFile {
             .unwrap_or(Path::new("."))
     }
 
-    /// Its text; while there is no file, that of a plan with the defaults for a case.
+    /// Returns the text of the plan; if there is no file, that of a default plan for a case.
     pub fn text(
         &self,
         case: impl FnOnce() -> Result<PathBuf, StudioError>,
@@ -81,10 +81,10 @@ impl PlanFile {
         Ok(plan.commented_text(&self.original)?)
     }
 
-    /// The text with another value of a key, or without the key; the plan in it.
+    /// Returns the text with a key set to a value or removed, and the plan that it holds.
     ///
-    /// The name of a rig or of a table of materials replaces what the plan holds written out. A value of a camera writes
-    /// out the whole rig in use, unless the plan has it.
+    /// The file name of a rig or of a table of materials replaces the one written in the plan. A value of a camera
+    /// writes out the rig in use, unless the plan already has it.
     pub fn changed(
         &self,
         text: &str,
@@ -114,7 +114,7 @@ impl PlanFile {
         self.read(&document)
     }
 
-    /// The text with other limbs; the plan in it.
+    /// Returns the text with changed limbs, and the plan that it holds.
     pub fn with_limbs(
         &self,
         text: &str,
@@ -137,15 +137,15 @@ impl PlanFile {
         Ok((text, plan))
     }
 
-    /// The plan in a text of the file.
+    /// Parses the plan from a text of the file.
     pub fn plan(&self, text: &str) -> Result<Plan, StudioError> {
         Ok(Plan::of_text(text, self.current())?)
     }
 
-    /// Saves a changed text beside the original, and keeps the one `before`.
+    /// Saves a changed text next to the original, and keeps the text `before` for undo.
     ///
     /// # Errors
-    /// [`StudioError::ChangedElsewhere`] if the file is no longer the one that was saved last.
+    /// [`StudioError::ChangedElsewhere`] if the file has changed since it was last saved.
     pub fn change(&mut self, before: String, text: String) -> Result<(), StudioError> {
         self.save_edits(text)?;
         self.earlier.push(before);
@@ -153,10 +153,10 @@ impl PlanFile {
         Ok(())
     }
 
-    /// Saves the text before the one of `now` again; `None` if nothing was changed.
+    /// Saves the text before the last change; `None` if there is no change to undo. `now` is kept for redo.
     ///
     /// # Errors
-    /// As of [`Self::change`].
+    /// The same as [`Self::change`].
     pub fn undo(&mut self, now: String) -> Result<Option<String>, StudioError> {
         let Some(text) = self.earlier.last().cloned() else {
             return Ok(None);
@@ -166,10 +166,10 @@ impl PlanFile {
         Ok(self.earlier.pop())
     }
 
-    /// Saves the text that was undone last; `None` if nothing was undone.
+    /// Saves the text that was last undone; `None` if there is none. `now` is kept for undo.
     ///
     /// # Errors
-    /// As of [`Self::change`].
+    /// The same as [`Self::change`].
     pub fn redo(&mut self, now: String) -> Result<Option<String>, StudioError> {
         let Some(text) = self.later.last().cloned() else {
             return Ok(None);
@@ -179,7 +179,7 @@ impl PlanFile {
         Ok(self.later.pop())
     }
 
-    /// Whether there is something to undo, and to redo.
+    /// Whether undo and redo are possible, in this order.
     pub fn can_step(&self) -> [bool; 2] {
         [!self.earlier.is_empty(), !self.later.is_empty()]
     }
@@ -193,18 +193,18 @@ impl PlanFile {
         Ok(())
     }
 
-    /// Writes a text over the original, which the person has asked for, and removes the changes beside it.
+    /// Overwrites the original with a text, at the user's request, and removes the changes next to it.
     pub fn save(&mut self, text: &str) -> Result<(), StudioError> {
         write_whole(&self.original, text.as_bytes())?;
         if self.has_edits() && std::fs::read_to_string(&self.edited).ok() == self.known {
-            // The original holds all of it now; a file that cannot be removed is shown as changes again.
+            // The original holds all changes now; a file that cannot be removed is shown as changes again.
             let _ = std::fs::remove_file(&self.edited);
         }
         self.known = None;
         Ok(())
     }
 
-    /// What a person typed into a field, as a value of TOML.
+    /// Converts the typed content of a field to a TOML value.
     fn value(&self, kind: FieldKind, key: &str, typed: &str) -> Result<Value, StudioError> {
         match kind {
             FieldKind::Text | FieldKind::Name => Ok(typed.into()),
@@ -233,7 +233,7 @@ impl PlanFile {
             let real = path.canonicalize();
             real.map_err(FileError::at("find", path))
         };
-        // Links may lead out.
+        // Links may lead out of the folder.
         if downwards && real(&target)?.starts_with(real(folder)?) {
             return Ok(());
         }
@@ -315,7 +315,7 @@ to_deg = 20.0
         assert_eq!(plan.depth.cameras, Some(rig.clone()));
         assert_eq!(plan.depth.rig, None);
         assert!(written.starts_with(TEXT), "{written}");
-        // A second value stands beside the first; the name of a file, or of none, takes the place of both.
+        // A second value is added to the first; a file name, or none, replaces both.
         let (written, plan) = set(&written, "depth.cameras.left.camera.k2", None);
         rig.left.camera.k2 = 0.0;
         assert_eq!(plan.depth.cameras, Some(rig));
@@ -328,7 +328,7 @@ to_deg = 20.0
             assert_eq!(plan.depth.rig, name.map(|name| folder.path().join(name)));
             assert!(!text.contains("cameras"), "{text}");
         }
-        // Nothing is written to leave a key out.
+        // Removing an absent key writes nothing.
         assert_eq!(set(TEXT, "depth.cameras.left.camera.k2", None).0, TEXT);
     }
 

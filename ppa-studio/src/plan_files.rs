@@ -1,4 +1,4 @@
-//! Files beside a plan that it may name: camera rigs and tables of materials.
+//! Files next to a plan that it may name: camera rigs and tables of materials.
 
 use std::collections::HashMap;
 use std::fs::{DirEntry, Metadata};
@@ -13,41 +13,41 @@ use ppa_xray::HuCalibration;
 
 use crate::error::StudioError;
 
-/// Largest file that is read to see what it holds.
+/// Maximum size of a file that is read to determine its kind.
 const MAX_BYTES: u64 = 1024 * 1024;
 
-/// Names of files with what each of them holds, in the order of the names.
+/// File names with a summary of the contents or the reason for an error, sorted by name.
 type Named = Vec<(String, String)>;
 
-/// Files that a field of a form offers.
+/// Files offered by a field of the form.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Offered {
-    /// Those that can be read, with what they hold.
+    /// Readable files with a summary of their contents.
     pub readable: Named,
-    /// Those that look like such a file and cannot be read, with the reason.
+    /// Files of this kind that cannot be read, with the reason.
     pub unreadable: Named,
 }
 
-/// Files that the fields of a form offer.
+/// Files offered by the fields of the form.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct FilesBeside {
-    /// Camera rigs, with the sizes of their images.
+    /// Camera rigs with their image sizes.
     pub rigs: Offered,
-    /// Tables from HU to material and density, with their segments.
+    /// Tables from HU to material and density, with the names of their segments.
     pub tables: Offered,
 }
 
-/// What a file is to a plan.
+/// Kind of a file that a plan may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Rig,
     Table,
 }
 
-/// What a file holds: its contents in short, or why it cannot be read; `None` for a file of another kind.
+/// Kind of a file with a summary of its contents, or why it cannot be read; `None` for a file of another kind.
 type Meaning = Option<(Kind, Result<String, String>)>;
 
-/// Files that were read before, which are read again only when they have changed.
+/// Cache of files, which are read again only if they have changed.
 #[derive(Default)]
 pub(crate) struct PlanFiles(Mutex<HashMap<PathBuf, Known>>);
 
@@ -58,10 +58,10 @@ struct Known {
 }
 
 impl PlanFiles {
-    /// Those in the folder of a plan.
+    /// Returns the files in the folder of a plan.
     pub fn beside(&self, folder: &Path) -> Result<FilesBeside, StudioError> {
         let entries = std::fs::read_dir(folder).map_err(FileError::at("read", folder))?;
-        // Names that are not UTF-8 cannot stand in a plan; links may lead out of the folder.
+        // A plan cannot contain names that are not UTF-8; links may lead out of the folder.
         let plain = |entry: DirEntry| {
             let about = entry.metadata().ok()?;
             let is_plain = about.is_file() && about.len() <= MAX_BYTES;
@@ -100,7 +100,7 @@ impl PlanFiles {
     }
 }
 
-/// What a file holds. One that no plan can name, as its contents are of another kind, has no meaning.
+/// Reads a file and summarises its contents; `None` if it is not of a kind that a plan can name.
 fn meaning(path: &Path) -> Meaning {
     let is = |extension: &str| path.extension().is_some_and(|found| found == extension);
     let kind = match (is("json"), is("toml")) {
@@ -119,14 +119,14 @@ fn meaning(path: &Path) -> Meaning {
     if read.is_err() && !looks_like(kind, path) {
         return None;
     }
-    // The file is named beside the reason.
+    // The page shows the file name next to the reason.
     let folder = path.parent().unwrap_or(Path::new("")).display().to_string();
     let reason = |error: String| error.replace(&format!("{folder}/"), "");
     Some((kind, read.map_err(reason)))
 }
 
-/// Whether a file that cannot be read was meant as one of its kind: a rig holds `left` or `right`, a table `segment`. Invalid JSON
-/// may be a damaged rig.
+/// Whether an unreadable file was meant to be of a kind: a rig has `left` or `right`, a table `segment`. Invalid JSON may be
+/// a damaged rig.
 fn looks_like(kind: Kind, path: &Path) -> bool {
     let Ok(text) = std::fs::read_to_string(path) else {
         return true;
@@ -147,7 +147,7 @@ fn looks_like(kind: Kind, path: &Path) -> bool {
     }
 }
 
-/// Images of a rig's cameras.
+/// Describes the image sizes of a rig's cameras.
 fn sizes(rig: &RigSpec) -> String {
     let [left, right] = [&rig.left, &rig.right]
         .map(|mounted| format!("{} x {}", mounted.camera.width, mounted.camera.height));
@@ -203,7 +203,7 @@ mod tests {
         }
     }
 
-    /// A file whose time and length are the same is not read again.
+    /// A file with unchanged time and length is not read again.
     #[test]
     fn files_are_read_again_only_when_they_change() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The form of a plan: a field for each setting, with its default, as the types of the plan declare them.
+//! The form of a plan: a field for each setting, with its default, as declared by the types of the plan.
 
 use ppa_depth::RigSpec;
 use ppa_generate::Plan;
@@ -10,13 +10,13 @@ use crate::plan_cameras::{CAMERAS, rig_value, rig_without, rows, within_cameras}
 use crate::plan_files::{FilesBeside, Offered};
 use crate::plan_keys::{PlanKey, plan_keys};
 
-/// Keys of files that are chosen from those beside the plan, each with the table that the plan may hold instead.
+/// Keys of files chosen from those next to the plan, each with the table that the plan may hold instead.
 const CHOSEN_FILES: [(&str, &str); 2] = [
     ("depth.rig", CAMERAS),
     ("xray.calibration_file", "xray.calibration"),
 ];
 
-/// What a field holds.
+/// Kind of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum FieldKind {
@@ -29,11 +29,11 @@ pub(crate) enum FieldKind {
     Path,
     /// One of the files in the folder of the plan.
     File,
-    /// One of the names.
+    /// One of the listed names.
     Name,
-    /// Several of the names.
+    /// Several of the listed names.
     Names,
-    /// A matrix, as TOML with a line for each row.
+    /// A matrix, as TOML with one line per row.
     Rows,
     /// Any other value, as TOML.
     Toml,
@@ -45,23 +45,23 @@ pub(crate) struct Field {
     pub key: String,
     pub kind: FieldKind,
     pub meaning: String,
-    /// Names or files to choose from, with what each of them means.
+    /// Names or files to choose from, with their meanings.
     pub names: Vec<(String, String)>,
-    /// What the file holds; `None` where the key is left out.
+    /// Value in the file; `None` if the key is absent.
     pub value: Option<String>,
-    /// What holds where the key is left out.
+    /// Value that applies if the key is absent.
     pub default: Option<String>,
-    /// A value of a setting that is off by default.
+    /// Example value for a setting that is off by default.
     pub example: Option<&'static str>,
-    /// Whether the plan needs the key, so that it cannot be left out.
+    /// Whether the plan requires the key.
     pub required: bool,
-    /// The table that the file holds in place of this file's name.
+    /// Table that the plan holds instead of this file name.
     pub instead: Option<&'static str>,
-    /// Files that are not offered since they cannot be read, with the reason.
+    /// Files that are not offered because they cannot be read, with the reason.
     pub unreadable: Vec<(String, String)>,
 }
 
-/// The fields of a plan file with this text. `cameras` are those of the plan, where they can be read; `files` lie beside it.
+/// Returns the fields of a plan file with this text. `cameras` are those of the plan, if readable; `files` are next to it.
 pub(crate) fn fields(
     text: &str,
     cameras: Option<&RigSpec>,
@@ -89,7 +89,7 @@ pub(crate) fn fields(
             None if name == CAMERAS => FieldKind::Heading,
             None => kind(&key, at(&defaults, name)),
         };
-        // Cameras that are not written out are those of the rig.
+        // If the plan does not write out its cameras, the rig gives the values.
         let default = match camera_key {
             Some(camera_key) if has_cameras => left_out.as_ref().and_then(|l| at(l, camera_key)),
             Some(camera_key) => cameras.as_ref().and_then(|c| at(c, camera_key)),
@@ -115,13 +115,13 @@ pub(crate) fn fields(
     Ok(fields)
 }
 
-/// The table that a plan may hold in place of a chosen file's name.
+/// Returns the table that a plan may hold instead of a chosen file's name.
 pub(crate) fn table_instead_of(key: &str) -> Option<&'static str> {
     let found = CHOSEN_FILES.into_iter().find(|(file, _)| *file == key);
     found.map(|(_, table)| table)
 }
 
-/// The kind of the field of a key; `None` where the form has none.
+/// Returns the kind of a key's field; `None` if the form has no such field.
 pub(crate) fn kind_of(key: &str) -> Option<FieldKind> {
     let fields = fields("", None, &FilesBeside::default());
     let fields = fields.expect("an empty text is TOML");
@@ -129,7 +129,7 @@ pub(crate) fn kind_of(key: &str) -> Option<FieldKind> {
     (field.kind != FieldKind::Heading).then_some(field.kind)
 }
 
-/// The form has no fields for limbs, which are listed apart, and for segments of the table of materials, which has files of its own.
+/// Whether a key has a field. Limbs are listed separately, and tables of materials have their own files.
 fn is_editable(key: &PlanKey) -> bool {
     let within = |table: &str| {
         let rest = key.key.strip_prefix(table);
@@ -139,7 +139,7 @@ fn is_editable(key: &PlanKey) -> bool {
     !elsewhere.into_iter().any(within)
 }
 
-/// Whether a key belongs to a field that holds its whole table.
+/// Whether a key belongs to a field that holds its entire table.
 fn is_below(key: &PlanKey, field: &Field) -> bool {
     let rest = key.key.strip_prefix(&field.key);
     field.kind == FieldKind::Toml && rest.is_some_and(|rest| rest.starts_with(['.', '[']))
@@ -151,7 +151,7 @@ fn names(key: &PlanKey, files: &FilesBeside) -> Vec<(String, String)> {
     offered(key, files).map_or_else(|| names.collect(), |files| files.readable.clone())
 }
 
-/// The files to choose from; `None` for a key of another kind.
+/// Returns the files to choose from; `None` for a key of another kind.
 fn offered<'a>(key: &PlanKey, files: &'a FilesBeside) -> Option<&'a Offered> {
     match key.key {
         "depth.rig" => Some(&files.rigs),

@@ -1,22 +1,22 @@
-//! The keys of a plan, as its types declare them.
+//! The keys of a plan, as declared by its types.
 
-/// Key, type, meaning, and names with their meanings, separated by tabs. A test of the workspace compares it with the types
-/// (`tests/tests/reference`).
+/// Key, type, meaning, and names with their meanings, separated by tabs. A test of the workspace (`tests/tests/reference`)
+/// compares it with the types.
 const TABLE: &str = include_str!("plan_keys.tsv");
 
 /// One key of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct PlanKey {
-    /// Tables and key, with dots between; `[]` marks a list.
+    /// Tables and key, separated by dots; `[]` marks a list.
     pub key: &'static str,
-    /// Its type, as the reference of keys names it.
+    /// Its type, as named in the reference of keys.
     pub kind: &'static str,
     pub meaning: &'static str,
-    /// The names that it may have, with what each of them means.
+    /// The allowed names with their meanings.
     pub names: Vec<(&'static str, &'static str)>,
 }
 
-/// All keys, a table before its keys.
+/// Returns all keys, each table before its keys.
 pub(crate) fn plan_keys() -> impl Iterator<Item = PlanKey> {
     TABLE.lines().map(|line| {
         let columns: Vec<&str> = line.split('\t').collect();

@@ -12,22 +12,22 @@ use toml_edit::{ArrayOfTables, Item, Table, value};
 use crate::error::StudioError;
 use crate::toml_value::put;
 
-/// A change of the list of limbs; `number` counts from 0.
+/// A change of the list of limbs; `number` is an index from 0.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum LimbChange {
-    /// Adds a case file of the plan's folder.
+    /// Adds a case file from the plan's folder.
     Add { case: String },
-    /// Takes a limb out of the plan.
+    /// Removes a limb from the plan.
     Remove { number: usize },
-    /// Sets the person of a limb.
+    /// Sets the patient of a limb.
     Patient { number: usize, patient: u32 },
-    /// Takes the case as it was, or with the changes beside it.
+    /// Uses the original case, or the one with the changes saved next to it.
     Case { number: usize, edits: bool },
 }
 
 impl LimbChange {
-    /// Changes the tables of a plan's limbs; `plan` is what they say, `folder` that of its file.
+    /// Changes the tables of a plan's limbs; `plan` is the parsed plan, `folder` that of its file.
     pub fn apply(
         &self,
         limbs: &mut ArrayOfTables,
@@ -57,7 +57,7 @@ impl LimbChange {
                     return Err(StudioError::Invalid(message));
                 }
                 limbs.remove(*number);
-                // Those before the first limb are about all of them.
+                // Comments before the first limb apply to all limbs.
                 if let (0, Some(comments), Some(first)) = (*number, comments, limbs.get_mut(0)) {
                     first.decor_mut().set_prefix(comments);
                 }
@@ -90,10 +90,10 @@ impl LimbChange {
     }
 }
 
-/// Cases in the folder of a plan that it does not name, by their file names.
+/// Returns the file names of the cases in the folder of a plan that it does not name.
 pub(crate) fn cases_beside(folder: &Path, plan: &Plan) -> Result<BTreeSet<String>, StudioError> {
     let entries = std::fs::read_dir(folder).map_err(FileError::at("read", folder))?;
-    // Names that are not UTF-8 cannot stand in a plan.
+    // A plan cannot contain names that are not UTF-8.
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     let is_case = |name: &String| {
         name.ends_with(".case.toml")
@@ -104,7 +104,7 @@ pub(crate) fn cases_beside(folder: &Path, plan: &Plan) -> Result<BTreeSet<String
     Ok(names.filter(is_case).filter(is_new).collect())
 }
 
-/// The person of a limb of the plan with the same scan, or a new one.
+/// Returns the patient number of a limb with the same scan in the plan, or a new number.
 fn patient_of_case(case: &Case, plan: &Plan) -> Result<u32, StudioError> {
     let scan = &case.source.volume_sha256;
     // Cases that cannot be read are reported where they are used.
@@ -122,7 +122,7 @@ fn patient_of_case(case: &Case, plan: &Plan) -> Result<u32, StudioError> {
     })
 }
 
-/// Refuses a second limb of the same person and side; `number` is the place of the limb itself, if it is in the plan.
+/// Refuses a second limb of the same patient and side; `number` is the index of the limb itself, if it is in the plan.
 fn require_other_limb(
     case: &Path,
     patient: u32,

@@ -1,4 +1,4 @@
-//! The numbers that a plan accepts for a key, found by trying its own checks.
+//! Limits of the numbers that a plan accepts for a key, found by trying its checks.
 
 use serde::Serialize;
 
@@ -6,16 +6,16 @@ use crate::plan_file::PlanFile;
 use crate::plan_form::{Field, FieldKind};
 use crate::plan_keys::plan_keys;
 
-/// No limit is looked for beyond this.
+/// Largest magnitude of a limit that is searched for.
 const FARTHEST: f64 = 1e9;
 
-/// How exactly a limit is found, as a share of its value, or of 1 below 1.
+/// Accuracy of a limit, relative to its magnitude or to 1, whichever is larger.
 const ACCURACY: f64 = 1e-9;
 
-/// Digits after the point that a limit may have.
+/// Maximum number of decimals of a limit.
 const MOST_DECIMALS: i32 = 6;
 
-/// Where the accepted numbers end.
+/// End of the accepted numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Limit {
     pub value: f64,
@@ -23,15 +23,15 @@ pub(crate) struct Limit {
     pub included: bool,
 }
 
-/// The accepted numbers around the one that holds now; an end without a limit is `None`.
+/// Range of accepted numbers around the current one; `None` for an end without a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Limits {
     pub low: Option<Limit>,
     pub high: Option<Limit>,
 }
 
-/// The limits of a field of the form while everything else is as in `text`; `None` where the field holds no number that is accepted, or where
-/// not all numbers between the limits are.
+/// Returns the limits of a field with everything else as in `text`; `None` if the field has no accepted number, or if probes
+/// beyond the limits are accepted.
 pub(crate) fn limits(file: &PlanFile, text: &str, field: &Field) -> Option<Limits> {
     if field.kind != FieldKind::Number {
         return None;
@@ -62,7 +62,7 @@ pub(crate) fn limits(file: &PlanFile, text: &str, field: &Field) -> Option<Limit
     (!has_gaps).then_some(limits)
 }
 
-/// Round numbers near and far from one, among which are accepted ones where only some are, such as multiples of half a degree.
+/// Returns round numbers near and far from `now`. If only some numbers are accepted, such as multiples of 0.5 degrees, they include some.
 fn probes(now: f64) -> impl Iterator<Item = f64> {
     let steps = (0..12).map(|k| 0.5 * 2_f64.powi(k));
     let sums = steps.flat_map(move |step| [now - step, now + step]);
@@ -70,8 +70,8 @@ fn probes(now: f64) -> impl Iterator<Item = f64> {
     sums.chain(products.flat_map(move |factor| [now / factor, now * factor]))
 }
 
-/// Where the numbers that `accepts` takes end, from an accepted one upwards (`sign` 1) or downwards (-1): bisection between the last accepted
-/// and the first refused of growing steps.
+/// Finds the end of the accepted numbers from `start` upwards (`sign` 1) or downwards (-1): growing steps up to the first
+/// refused number, then bisection.
 fn limit(start: f64, sign: f64, is_whole: bool, accepts: impl Fn(f64) -> bool) -> Option<Limit> {
     let first = if is_whole {
         1.0
@@ -109,7 +109,7 @@ fn limit(start: f64, sign: f64, is_whole: bool, accepts: impl Fn(f64) -> bool) -
         false => roundest(inside, outside).unwrap_or(inside),
     };
     Some(Limit {
-        // Without a negative zero.
+        // Avoids a negative zero.
         value: value + 0.0,
         included: accepts(value),
     })
@@ -119,7 +119,7 @@ fn tolerance(value: f64) -> f64 {
     ACCURACY * value.abs().max(1.0)
 }
 
-/// The number with the fewest decimals between two others, or as near to them as they are found.
+/// Returns the number with the fewest decimals between two others, or within the tolerance of them.
 fn roundest(a: f64, b: f64) -> Option<f64> {
     let (middle, most) = (0.5 * (a + b), 0.5 * (a - b).abs() + tolerance(b));
     let rounded = (0..=MOST_DECIMALS).map(|decimals| {

@@ -1,4 +1,4 @@
-//! The computed label of the pose that is shown.
+//! The computed label of the displayed pose.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,19 +8,19 @@ use ppa_label::{Exposure, JointSpace, LabelScale, PoseLabel, ScaleName, read_bon
 use crate::desk::Shown;
 use crate::error::StudioError;
 
-/// The joint space of the limb that is shown, found once.
+/// The joint space of the displayed limb, computed once.
 #[derive(Default)]
 pub(crate) struct Labels {
     kept: Mutex<Option<(u64, Arc<JointSpace>)>>,
 }
 
 impl Labels {
-    /// Frees what was computed from the limb.
+    /// Frees the data computed from the limb.
     pub fn forget_limb(&self) {
         *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// The label of a pose by the graded scale, by the place of the device in the `ct` frame; none where the case names no bones.
+    /// Returns the label of a pose on the graded scale, from the pose of the device in the `ct` frame; `None` if the case names no bones.
     pub fn of(
         &self,
         shown: &Shown,

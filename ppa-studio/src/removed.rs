@@ -1,16 +1,16 @@
-//! The surface of what was removed from a scan: couch, sheets, other bodies, and the hollows of the limb that count as limb.
+//! The surface of the parts removed from a scan: couch, sheets, other bodies, and the hollows of the limb that count as limb.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::{Volume, VolumeError};
 use rayon::prelude::*;
 
-/// Value of voxels that are limb, or so near its skin that a coarse scan cannot say of which side they are.
+/// Value of voxels in the limb, or so near its skin that their side is undetermined in a coarse scan.
 const NOTHING_HU: f32 = -2000.0;
 
-/// A coarse scan whose surface at `iso_hu` is that of what was removed: the scan itself outside the limb, and inside it the scan mirrored at
-/// `iso_hu`, so that hollows are bodies. What lies within a voxel of the skin is left out.
+/// Returns a coarse scan whose surface at `iso_hu` is that of the removed parts: the scan itself outside the limb, and inside it
+/// the scan mirrored at `iso_hu`, so that hollows become bodies. Voxels within one voxel of the skin are left out.
 ///
-/// `mask` says which voxels of `scan` are limb; the axes of both lattices are parallel.
+/// `mask` marks the voxels of `scan` in the limb; the axes of both grids are parallel.
 pub(crate) fn removed(
     coarse: &Volume,
     scan: &Volume,
@@ -60,12 +60,12 @@ pub(crate) fn removed(
     Volume::new(grid.clone(), hu)
 }
 
-/// The mask and the voxels that share a face, an edge or a corner with it.
+/// Returns the mask and the voxels that share a face, an edge or a corner with it.
 fn dilated(size: [usize; 3], mut mask: Vec<bool>) -> Vec<bool> {
     let strides = [1, size[0], size[0] * size[1]];
     for (stride, count) in strides.into_iter().zip(size) {
         let before = mask.clone();
-        // Lines along the axis lie in blocks of `count` layers of `stride` voxels.
+        // Lines along the axis form blocks of `count` layers of `stride` voxels.
         let block = stride * count;
         for (grown, before) in mask.chunks_mut(block).zip(before.chunks(block)) {
             let (lower, upper) = (&before[..block - stride], &before[stride..]);
@@ -98,7 +98,7 @@ mod tests {
         }
     }
 
-    /// A ball with an air bubble in it, and a small ball beside it that was removed, with half of the voxels along each axis.
+    /// A ball with an air bubble in it, and a small removed ball next to it, with half of the voxels along each axis.
     #[test]
     fn bodies_and_hollows_stay_and_the_skin_goes() {
         let grid = |side: usize, spacing_mm: f64| {

@@ -1,4 +1,4 @@
-//! Images of a pose, and what they share between requests: room, cameras, beam and voxels.
+//! Images of a pose, and the data shared between requests: room, cameras, beam and voxels.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,20 +23,20 @@ use crate::newest::Ticket;
 use crate::png::png;
 use crate::what_if::WhatIf;
 
-/// A room with its cameras and beam, and the plan it was made from.
+/// A room with its cameras and beam, and the plan that it was made from.
 struct KeptSetup {
     plan: Plan,
     setup: Arc<SceneSetup>,
 }
 
-/// Voxels of a limb around the central beam, and what they were made from.
+/// Voxels of a limb around the central beam, and the inputs that they were made from.
 struct KeptPhantom {
     revision: u64,
     plan: Plan,
     phantom: Arc<PreparedPhantom<'static>>,
 }
 
-/// A limb in another body shape, and what it was made from.
+/// A limb in another body shape, and the inputs that it was made from.
 struct KeptShape {
     revision: u64,
     shape: BodyShape,
@@ -46,7 +46,7 @@ struct KeptShape {
     limb: Arc<VisibleLimb>,
 }
 
-/// Scenes and voxels kept for the next request.
+/// Cache of scenes and voxels for the next request.
 #[derive(Default)]
 pub(crate) struct Scenes {
     shape: Mutex<Option<KeptShape>>,
@@ -56,22 +56,22 @@ pub(crate) struct Scenes {
 
 /// Both depth images of a pose.
 pub(crate) struct DepthPicture {
-    /// In false colour, left camera at the left, PNG.
+    /// PNG in false colour, left camera at the left.
     pub png: Vec<u8>,
     pub report: DepthReport,
 }
 
-/// What is known of depth images.
+/// Report on the depth images.
 #[derive(Debug, Serialize)]
 pub(crate) struct DepthReport {
-    /// Pixels with a depth, left camera first.
+    /// Number of pixels with a depth, left camera first.
     pub valid_pixels: Vec<usize>,
     /// First and last depth of the colours, mm.
     pub range_mm: [f64; 2],
-    /// What networks say of them, if any are open.
+    /// Answer of the networks, if any are open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<NetworkAnswer>,
-    /// The command that asks them, if both cameras see the joint.
+    /// Command for the same prediction, if networks are open and both cameras see the joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network_command: Option<String>,
 }
@@ -82,7 +82,7 @@ pub(crate) struct RadiographPicture {
     pub report: RadiographReport,
 }
 
-/// What is known of a radiograph.
+/// Report on a radiograph.
 #[derive(Debug, Serialize)]
 pub(crate) struct RadiographReport {
     pub exposure_index: Option<f64>,
@@ -92,7 +92,7 @@ pub(crate) struct RadiographReport {
     pub contact: Contact,
 }
 
-/// Which image of an exposure.
+/// Preview or final image of an exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pass {
     /// Larger pixels and fewer histories, within a tenth of the time.
@@ -102,13 +102,13 @@ pub(crate) enum Pass {
 }
 
 impl Scenes {
-    /// Frees what was computed from the limb.
+    /// Frees the data computed from the limb.
     pub fn forget_limb(&self) {
         *self.shape.lock().unwrap_or_else(PoisonError::into_inner) = None;
         *self.phantom.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Room, cameras and beam of a plan: those of the request before, if nothing they depend on has changed.
+    /// Returns room, cameras and beam of a plan, from the cache if no input has changed.
     pub fn setup(&self, plan: &Plan) -> Result<Arc<SceneSetup>, StudioError> {
         let mut kept = self.setup.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = &*kept
@@ -129,7 +129,7 @@ impl Scenes {
         Ok(setup)
     }
 
-    /// What both cameras see, and what networks say of it.
+    /// Renders both depth images and asks the networks.
     pub fn depth(
         &self,
         shown: &Shown,
@@ -168,7 +168,7 @@ impl Scenes {
         })
     }
 
-    /// The limb in another body shape: that of the request before, if nothing it depends on has changed.
+    /// Returns the limb in another body shape, from the cache if no input has changed.
     fn shaped(
         &self,
         shown: &Shown,
@@ -195,7 +195,7 @@ impl Scenes {
         Ok(limb)
     }
 
-    /// The limb with all that an exposure takes.
+    /// Returns the limb with everything needed for an exposure.
     pub fn exposable(&self, shown: &Shown, plan: &Plan) -> Result<ExposableLimb, StudioError> {
         let setup = self.setup(plan)?;
         let phantom = self.phantom(shown, plan)?;
@@ -206,7 +206,7 @@ impl Scenes {
         ))
     }
 
-    /// The radiograph, until a later request replaces this one.
+    /// Computes the radiograph, until a later request replaces this one.
     pub fn radiograph(
         &self,
         shown: &Shown,
@@ -249,7 +249,7 @@ impl Scenes {
         })
     }
 
-    /// Voxels around the central beam: those of the request before, if nothing they depend on has changed.
+    /// Returns the voxels around the central beam, from the cache if no input has changed.
     fn phantom(
         &self,
         shown: &Shown,
@@ -262,7 +262,7 @@ impl Scenes {
         {
             return Ok(kept.phantom.clone());
         }
-        // Freed first: both would need the memory of two.
+        // Freed first, so that only one phantom is in memory.
         *kept = None;
         let phantom = Arc::new(prepared_phantom(shown.prepared(), plan)?);
         *kept = Some(KeptPhantom {

@@ -7,11 +7,11 @@ use std::time::Duration;
 use crate::error::StudioError;
 use crate::studio::Studio;
 
-/// How long answers under way are sent after the end was asked for; a browser may never read its answer, or never end its request.
+/// Time for sending the last answers after a stop; a browser may never read its answer or finish its request.
 const LAST_ANSWERS: Duration = Duration::from_secs(2);
 
-/// Serves a studio until `stop` receives something or loses its sender. Poses and files under way are finished first, and for two
-/// seconds answers are sent.
+/// Serves a studio until `stop` receives a message or loses its sender. Then finishes the current poses and files, and sends
+/// answers for two more seconds.
 ///
 /// # Errors
 /// [`StudioError::Serve`] when the socket cannot be used.
@@ -26,7 +26,7 @@ pub fn serve(studio: Studio, listener: TcpListener, stop: Receiver<()>) -> Resul
     let (ending, ended) = tokio::sync::oneshot::channel();
     let stopped = async move {
         let wait = move || {
-            // Both ends of the channel mean the same.
+            // A message and a lost sender mean the same.
             let _ = stop.recv();
             studio.stop();
         };
@@ -46,7 +46,7 @@ pub fn serve(studio: Studio, listener: TcpListener, stop: Receiver<()>) -> Resul
             () = patience => Ok(()),
         }
     });
-    // Waits for the work that requests began, such as writing a file.
+    // Waits for work started by requests, such as writing a file.
     drop(runtime);
     served.map_err(StudioError::Serve)
 }

@@ -1,4 +1,4 @@
-//! The shards of a dataset, which other machines make.
+//! The shards of a dataset, made by other machines.
 
 use std::path::{Path, PathBuf};
 
@@ -10,19 +10,19 @@ use serde::Serialize;
 
 use crate::error::StudioError;
 
-/// How far a shard is, by its files.
+/// Progress of a shard according to its files.
 #[derive(Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct ShardState {
-    /// As `2/8`.
+    /// Shard and count, such as `2/8`.
     pub shard: String,
     pub pose_jobs: usize,
     pub made: usize,
-    /// Whether a process writes into its folder now.
+    /// Whether a process is writing into its folder.
     pub running: bool,
     pub complete: bool,
 }
 
-/// The shards of a dataset that `ppa submit` divided, or that lie beside it as `ppa generate --shard` names them; in order.
+/// Returns the shards of a dataset in order: those of `ppa submit`, or the folders next to it named as by `ppa generate --shard`.
 pub(crate) fn shards(root: &Path) -> Result<Vec<ShardState>, StudioError> {
     let folders = if ClusterFolder::is_one(root) {
         of_cluster(root)?
@@ -49,7 +49,7 @@ fn of_cluster(root: &Path) -> Result<Vec<(Part, PathBuf)>, StudioError> {
     Ok(parts.collect())
 }
 
-/// Folders such as `dataset_2_of_8` beside `dataset`.
+/// Finds folders such as `dataset_2_of_8` next to `dataset`.
 fn beside(root: &Path) -> Result<Vec<(Part, PathBuf)>, StudioError> {
     let name = root.file_name().unwrap_or_default().to_string_lossy();
     let parent = root.parent().unwrap_or(Path::new("."));
@@ -67,7 +67,7 @@ fn beside(root: &Path) -> Result<Vec<(Part, PathBuf)>, StudioError> {
 }
 
 fn state(part: Part, folder: &Path) -> ShardState {
-    // A folder that was not begun or is damaged holds nothing that counts.
+    // A missing or damaged folder counts as empty.
     let found = status(folder).ok();
     ShardState {
         shard: part.to_string(),

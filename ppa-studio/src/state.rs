@@ -24,46 +24,46 @@ use crate::training_errors::TrainingErrors;
 use crate::trainings::Trainings;
 use crate::what_if::WhatIf;
 
-/// What is open, and the work under way.
+/// Open files and running tasks.
 pub(crate) struct State {
     pub token: Token,
     /// When the program started.
     pub started: SystemTime,
-    /// Depth images under way.
+    /// Running request for depth images.
     pub depth: Newest,
-    /// The radiograph under way.
+    /// Running request for a radiograph or its dose.
     pub radiograph: Newest,
-    /// The surface of the coarse scan under way.
+    /// Running request for the surface of the coarse scan.
     pub surface: Newest,
-    /// The label under way.
+    /// Running request for a label.
     pub label: Newest,
-    /// What the cameras see of the joint, under way.
+    /// Running request for the cameras' coverage of the joint.
     pub coverage: Newest,
-    /// The dataset that is being made.
+    /// Generation of a dataset.
     pub generation: Generation,
-    /// The forecast under way.
+    /// Running forecast.
     pub forecast: Stoppable,
-    /// The contact sheet under way.
+    /// Running request for a contact sheet.
     pub sheet: Newest,
-    /// The list of poses under way.
+    /// Running request for the list of poses.
     pub quality: Newest,
-    /// The check of all images under way.
+    /// Running check of all images.
     pub check: Newest,
-    /// One change of readers' grades at a time.
+    /// Lock that allows one change of readers' grades at a time.
     pub grading: Mutex<()>,
-    /// Networks that judge the poses, if there are any.
+    /// Networks that predict the quality of poses, if any.
     pub network: Option<Network>,
-    /// Frames that they judge as they come, if there are any.
+    /// Watched frames that they predict from, if any.
     pub live: Option<Live>,
     /// Files that the plan may name.
     pub plan_files: PlanFiles,
-    /// Trainings that were opened, or lie beside the plan.
+    /// Training runs that were opened, or are next to the plan or the networks.
     pub trainings: Trainings,
-    /// Their errors.
+    /// Errors of the training runs.
     pub training_errors: TrainingErrors,
-    /// Why landmarks of the scan that was opened have to be set by hand, if so.
+    /// Why landmarks must be set by hand, or `None` if they were found.
     pub note: Option<String>,
-    /// The dataset that was opened, if it is one.
+    /// The opened dataset, if any.
     pub opened_dataset: Option<PathBuf>,
     plan: Mutex<Arc<Plan>>,
     plan_file: Mutex<PlanFile>,
@@ -71,9 +71,9 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Opens what there is, and takes up the changes that were saved beside them.
+    /// Opens the given files and restores the changes saved next to them.
     pub fn open(opening: &Opening, token: Token) -> Result<Self, StudioError> {
-        // First: what is opened may have to be made.
+        // Networks first: reading the input may write files, those of the built-in phantom.
         let network = opening.networks.clone().map(Network::open).transpose()?;
         let live = match (&opening.networks, opening.watch.clone()) {
             (_, None) => None,
@@ -84,13 +84,13 @@ impl State {
         let plan_file = match (opened.plan_file, &opened.limb) {
             (Some(file), _) => file,
             (None, Some((file, _))) => new_plan(file),
-            // No file: a plan is made for a limb only, and none can be opened.
+            // No file: plans are made for limbs only, and no limb can be opened.
             (None, None) => PathBuf::new(),
         };
         let plan_file = PlanFile::new(plan_file);
         let trainings = match (opened.trainings, &opening.networks) {
             (Some(trainings), _) => trainings,
-            // Nothing is open but networks.
+            // Only networks are open.
             (None, Some(networks)) if opened.limb.is_none() && opened.dataset.is_none() => {
                 Trainings::beside(&networks.left)
             }
@@ -133,10 +133,10 @@ impl State {
         })
     }
 
-    /// The limb that is open.
+    /// Returns the open limb.
     ///
     /// # Errors
-    /// [`StudioError::NoLimb`] for a dataset of which no limb was opened yet.
+    /// [`StudioError::NoLimb`] if no limb is open.
     pub fn limb(&self) -> Result<Arc<Limb>, StudioError> {
         let limb = self.limb.lock();
         let limb = limb.unwrap_or_else(PoisonError::into_inner).clone();
@@ -165,7 +165,7 @@ impl State {
         Ok(())
     }
 
-    /// Changes what is shown and saves it beside the case.
+    /// Changes the displayed limb and saves it next to the case.
     pub fn edit(
         &self,
         change: impl FnOnce(&mut Desk) -> Result<(), StudioError>,
@@ -175,7 +175,7 @@ impl State {
         self.limb()?.edit(change)
     }
 
-    /// The plan whose room and exposure are shown.
+    /// Returns the plan of the displayed room and exposure.
     pub fn plan(&self) -> Arc<Plan> {
         let plan = self.plan.lock();
         plan.unwrap_or_else(PoisonError::into_inner).clone()
@@ -186,24 +186,24 @@ impl State {
         file.unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The file that holds the case as it is shown.
+    /// Returns the file that holds the displayed case.
     pub fn case_on_disk(&self) -> Result<PathBuf, StudioError> {
         Ok(self.limb()?.case_on_disk())
     }
 
-    /// The person of the limb that is open: as the plan says, else 0 as in a new plan.
+    /// Returns the patient number of the open limb in the plan, or 0, as in a new plan.
     pub fn patient(&self) -> Result<u32, StudioError> {
         let file = self.limb()?.case_file().original().to_owned();
         Ok(self.plan().patient_of(&file).unwrap_or(0))
     }
 
-    /// The file of the plan as it is shown; none where no file holds it yet.
+    /// Returns the file of the displayed plan, or `None` if it is not stored in a file yet.
     pub fn opened_plan(&self) -> Option<PathBuf> {
         let file = self.plan_file().current().to_owned();
         file.exists().then_some(file)
     }
 
-    /// Changes the text of the plan and saves it beside the original.
+    /// Changes the text of the plan and saves it next to the original.
     pub fn edit_plan(
         &self,
         change: impl FnOnce(&PlanFile, &str) -> Result<(String, Plan), StudioError>,
@@ -218,7 +218,7 @@ impl State {
         Ok(())
     }
 
-    /// Takes up the text of the plan that [`PlanFile::undo`] or [`PlanFile::redo`] gives.
+    /// Applies the plan text returned by [`PlanFile::undo`] or [`PlanFile::redo`].
     pub fn step_plan(
         &self,
         step: impl FnOnce(&mut PlanFile, String) -> Result<Option<String>, StudioError>,
@@ -231,13 +231,13 @@ impl State {
         Ok(())
     }
 
-    /// Takes a plan for room and exposure.
+    /// Uses a plan for room and exposure.
     fn show_plan(&self, plan: Plan) {
         let shown = self.plan.lock();
         *shown.unwrap_or_else(PoisonError::into_inner) = Arc::new(plan);
     }
 
-    /// The plan as it is shown, in a file that commands read: written now if there is none yet.
+    /// Returns the displayed plan and its file, which is written if it does not exist.
     pub fn plan_on_disk(&self) -> Result<(PathBuf, Arc<Plan>), StudioError> {
         let mut file = self.plan_file();
         if !file.current().exists() {
@@ -249,10 +249,10 @@ impl State {
         Ok((file.current().to_owned(), self.plan()))
     }
 
-    /// The folder of a dataset beside the plan.
+    /// Returns the folder of the opened dataset, or of a dataset next to the plan.
     ///
     /// # Errors
-    /// [`StudioError::Invalid`] for anything but the name of a folder there.
+    /// [`StudioError::Invalid`] unless `name` is the name of a folder there.
     pub fn dataset(&self, name: &str) -> Result<PathBuf, StudioError> {
         let opened = self.opened_dataset.as_ref();
         if let Some(root) = opened.filter(|root| root.file_name().is_some_and(|of| of == name)) {
@@ -261,7 +261,7 @@ impl State {
         named_folder(self.plan_file().folder(), name, "the plan")
     }
 
-    /// The plan with changes, of the case that is shown.
+    /// Returns the plan with the page's changes, for the displayed case.
     pub fn plan_with(&self, what_if: &WhatIf) -> Result<Plan, StudioError> {
         let mut plan = what_if.plan(&self.plan())?;
         if plan.cases.is_empty() {
@@ -274,7 +274,7 @@ impl State {
     }
 }
 
-/// The folder of a name in `folder`; the error says that it is to lie beside `neighbour`.
+/// Returns the folder `name` in `folder`; an error describes its place as next to `neighbour`.
 ///
 /// # Errors
 /// [`StudioError::Invalid`] for anything but a plain name, and for a link.

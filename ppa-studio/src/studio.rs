@@ -1,4 +1,4 @@
-//! A limb, open in the browser.
+//! The studio that a browser shows.
 
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use crate::opening::Opening;
 use crate::state::State;
 use crate::token::Token;
 
-/// A limb, open in the browser. Clones share their state.
+/// A studio, shown in the browser. Clones share their state.
 #[derive(Clone)]
 pub struct Studio(Arc<State>);
 
 impl Studio {
-    /// Opens a scan, a case, a plan, a dataset or trainings, and finds what the case says; changes that were saved beside case and plan are taken up again.
+    /// Opens a scan, case, plan, dataset or training runs, prepares the limb, and restores the changes saved next to case and plan.
     ///
     /// # Errors
     /// [`StudioError`] naming the file at fault.
@@ -23,17 +23,17 @@ impl Studio {
         Self::open_with(opening, Token::random()?)
     }
 
-    /// The same with the token that the page needs.
+    /// The same as [`Self::open`], with a given token for the page.
     ///
     /// # Errors
-    /// As [`Self::open`].
+    /// The same as [`Self::open`].
     pub fn open_with(opening: &Opening, token: Token) -> Result<Self, StudioError> {
         Ok(Self(Arc::new(State::open(opening, token)?)))
     }
 
-    /// The address to open in a browser on this machine, with the token that lets it in.
+    /// Returns the address to open in a browser on this machine, including the token.
     pub fn address(&self, mut listening: SocketAddr) -> String {
-        // Nothing can be asked of "all addresses of this machine".
+        // A browser cannot connect to the unspecified address.
         if listening.ip().is_unspecified() {
             listening.set_ip(match listening {
                 SocketAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
@@ -43,7 +43,7 @@ impl Studio {
         format!("http://{listening}/?token={}", self.0.token.secret())
     }
 
-    /// Ends the images and the forecast under way, and a run after the poses under way.
+    /// Cancels running images, forecasts and training errors, and ends a generation after its current poses.
     pub(crate) fn stop(&self) {
         self.0.depth.cancel();
         self.0.radiograph.cancel();
@@ -52,7 +52,7 @@ impl Studio {
         self.0.generation.finish();
     }
 
-    /// All that the page asks for. It answers only requests with the token or the cookie that the token gives, to localhost or an IP address.
+    /// Returns the router for the page. It answers only requests with the token or its cookie, to localhost or an IP address.
     pub fn router(&self) -> Router {
         crate::routes::router(self.0.clone())
     }

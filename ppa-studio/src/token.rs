@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::StudioError;
 
-/// Digits of the cookie's name, those before the secret.
+/// Number of leading digits that name the cookie; the rest is the secret.
 const NAME_DIGITS: usize = 8;
 const DIGITS: usize = 40;
 
-/// A random number that only the person who started the program knows: the name of a cookie, and its secret value.
+/// A random number known only to the user who started the program: the name of a cookie and its secret value.
 ///
-/// Cookies of all ports of a host are sent to each of them, so every studio has a cookie of its own.
+/// Browsers send the cookies of a host to all its ports, so every studio has its own cookie name.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Token(String);
 
 impl Token {
     /// # Errors
-    /// [`StudioError::Random`] where the system has no random numbers.
+    /// [`StudioError::Random`] if the system provides no random numbers.
     pub fn random() -> Result<Self, StudioError> {
         let mut bytes = [0; DIGITS / 2];
         getrandom::fill(&mut bytes).map_err(StudioError::Random)?;
@@ -28,7 +28,7 @@ impl Token {
         ))
     }
 
-    /// Name of the cookie that holds it.
+    /// Returns the name of the cookie that holds the token.
     pub(crate) fn cookie(&self) -> String {
         format!("ppa_studio_{}", &self.0[..NAME_DIGITS])
     }
@@ -37,7 +37,7 @@ impl Token {
         &self.0[NAME_DIGITS..]
     }
 
-    /// Compared in the same time wherever the first difference is.
+    /// Compares the secret in constant time.
     pub(crate) fn is(&self, given: &str) -> bool {
         let secret = self.secret();
         let pairs = secret.bytes().zip(given.bytes());
@@ -46,7 +46,7 @@ impl Token {
     }
 }
 
-/// Without the secret.
+/// Omits the secret.
 impl fmt::Debug for Token {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Token({})", self.cookie())

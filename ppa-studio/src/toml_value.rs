@@ -1,9 +1,8 @@
-//! Replacement of values in a TOML file, keeping its comments.
+//! Replacement of values in a TOML file that keeps its comments.
 
 use toml_edit::{Item, Table, TableLike, Value};
 
-/// Puts a value in the place of a key with dots, or removes the key; comments stay. `None` where something else than a table is on
-/// the way.
+/// Sets the value of a dotted key, or removes the key; keeps comments. `None` if a part of the path is not a table.
 pub(crate) fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) -> Option<()> {
     if let Some((first, rest)) = key.split_once('.') {
         if !table.contains_key(first) {
@@ -29,7 +28,7 @@ pub(crate) fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) ->
     Some(())
 }
 
-/// A table without a line of its own while it holds only other tables.
+/// Returns a table that has no header line while it holds only other tables.
 pub(crate) fn implicit() -> Table {
     let mut table = Table::new();
     table.set_implicit(true);

@@ -1,4 +1,4 @@
-//! Errors of a finished training on its evaluation images, and the images with the largest.
+//! Errors of a finished training run on its evaluation images, and the images with the largest errors.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,31 +12,31 @@ use serde::Serialize;
 use crate::error::StudioError;
 use crate::newest::{Newest, Ticket};
 
-/// Images with the largest errors that are shown.
+/// Number of images with the largest errors that are shown.
 const WORST: usize = 12;
 
-/// Images that are predicted before it is asked whether anybody still waits.
+/// Number of images predicted between checks for a newer request.
 const TOGETHER: usize = 64;
 
-/// The errors that are computed, and what was found of each training.
+/// The current computation of errors, and the results of each training run.
 #[derive(Default)]
 pub(crate) struct TrainingErrors {
-    /// The computation under way.
+    /// Running computation.
     pub turn: Newest,
-    /// Files of the images with the largest errors, by the training's folder.
+    /// Files of the images with the largest errors, by the folder of the training run.
     worst: Mutex<BTreeMap<PathBuf, Vec<Vec<PathBuf>>>>,
 }
 
-/// What a network says of its evaluation images.
+/// Evaluation of a network on its evaluation images.
 #[derive(Debug, Serialize)]
 pub(crate) struct Errors {
     pub evaluation: Evaluation,
-    /// The largest errors, the largest first.
+    /// The largest errors in descending order.
     pub worst: Vec<Row>,
 }
 
 impl TrainingErrors {
-    /// Predicts the evaluation images of a finished training, as `ppa eval` does; ends when a later request replaces this one.
+    /// Predicts the evaluation images of a finished training run, as `ppa eval` does, until a later request replaces this one.
     pub fn compute(&self, run: &Path, ticket: &Ticket) -> Result<Errors, StudioError> {
         let (config, network) = trained(run)?;
         let tested = samples(&config, &config.evaluation)?;
@@ -75,10 +75,10 @@ impl TrainingErrors {
         })
     }
 
-    /// Files of an image with one of the largest errors: of one camera, or of both.
+    /// Returns the files of an image with one of the largest errors: of one camera, or of both.
     ///
     /// # Errors
-    /// [`StudioError::Invalid`] unless the errors of that training were computed.
+    /// [`StudioError::Invalid`] unless the errors of that training run were computed.
     pub fn images(&self, run: &Path, number: usize) -> Result<Vec<PathBuf>, StudioError> {
         let kept = self.worst.lock().unwrap_or_else(PoisonError::into_inner);
         let files = kept.get(run).and_then(|images| images.get(number)).cloned();

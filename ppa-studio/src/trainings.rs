@@ -1,4 +1,4 @@
-//! The trainings below a folder: their progress, and the contents of their logs.
+//! The training runs below a folder: their progress and the contents of their logs.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -13,46 +13,46 @@ use serde::Serialize;
 use crate::commands::of_training;
 use crate::error::StudioError;
 
-/// File that every training has.
+/// Configuration file of every training run.
 pub(crate) const CONFIG_FILE: &str = "config.toml";
 const LOG_FILE: &str = "log.jsonl";
 const WEIGHTS_FILE: &str = "weights.safetensors";
 
-/// How deep trainings are looked for: those of an experiment lie in experiment, column, fold, camera and seed.
+/// Maximum depth of the search: the runs of an experiment are in folders for experiment, column, fold, camera and seed.
 const DEEPEST: usize = 6;
 
-/// Most rows of a log that are sent; of longer ones, means of successive rows.
+/// Maximum number of log rows that are sent; longer logs are reduced to means of successive rows.
 const MOST_ROWS: usize = 1000;
 
-/// Where trainings are looked for.
+/// Search for training runs.
 pub(crate) struct Trainings {
-    /// Their names are paths from here.
+    /// Folder that the names of runs are relative to.
     base: PathBuf,
-    /// A training, or a folder of them.
+    /// A training run, or a folder of them.
     start: PathBuf,
     depth: usize,
-    /// What was read of logs that have not changed since.
+    /// Cache of logs.
     known: Mutex<HashMap<PathBuf, KnownLog>>,
-    /// What folders held when they were read last.
+    /// Cache of folders.
     folders: Mutex<HashMap<PathBuf, KnownFolder>>,
 }
 
-/// What a folder held when its entries changed last.
+/// Contents of a folder at its last modification time.
 struct KnownFolder {
     changed: SystemTime,
     holds: Held,
 }
 
-/// What a folder is to the search.
+/// Kind of a folder in the search.
 #[derive(Clone)]
 enum Held {
     Training,
-    /// A dataset holds no trainings.
+    /// A dataset, which holds no training runs.
     Dataset,
     Folders(Vec<PathBuf>),
 }
 
-/// What a log of some length held.
+/// Contents of a log at a given length.
 #[derive(Clone)]
 struct KnownLog {
     bytes: u64,
@@ -61,30 +61,30 @@ struct KnownLog {
     last: BTreeMap<String, f64>,
 }
 
-/// A training as its files show it.
+/// State of a training run according to its files.
 #[derive(Debug, Serialize)]
 pub(crate) struct TrainingState {
     pub name: String,
-    /// Steps of the last row of its log.
+    /// Step of the last row of its log.
     pub step: u64,
-    /// Rows of its log.
+    /// Number of rows of its log.
     pub rows: usize,
-    /// Steps in all.
+    /// Total number of steps.
     pub steps: u64,
-    /// Whether its weights are there.
+    /// Whether its weights exist.
     pub finished: bool,
-    /// Seconds since its log was written last.
+    /// Seconds since its log was last written.
     pub silent_s: Option<f64>,
     /// The last value of each scalar.
     pub last: BTreeMap<String, f64>,
-    /// The command that evaluates it, if it is finished.
+    /// Command that evaluates it, if it is finished.
     pub command: Option<String>,
     /// Why its configuration or its log cannot be read.
     pub error: Option<String>,
 }
 
 impl Trainings {
-    /// A training, or those below a folder.
+    /// Returns a search for a training run, or for those below a folder.
     pub fn below(start: &Path) -> Self {
         let is_training = is_training(start);
         let base = start.parent().filter(|_| is_training).unwrap_or(start);
@@ -97,7 +97,7 @@ impl Trainings {
         }
     }
 
-    /// Those in the folder of a file or folder.
+    /// Returns a search of the folder that contains `path`.
     pub fn beside(path: &Path) -> Self {
         let parent = path.parent().filter(|it| !it.as_os_str().is_empty());
         let folder = parent.unwrap_or(Path::new("."));
@@ -110,25 +110,25 @@ impl Trainings {
         }
     }
 
-    /// Folder that is searched.
+    /// Returns the searched folder.
     pub fn start(&self) -> &Path {
         &self.start
     }
 
-    /// All trainings, by name.
+    /// Returns the states of all training runs, sorted by name.
     pub fn states(&self) -> Result<Vec<TrainingState>, StudioError> {
         Ok(self.folders()?.iter().map(|run| self.state(run)).collect())
     }
 
-    /// Whether there are none.
+    /// Whether there are no training runs.
     pub fn is_empty(&self) -> Result<bool, StudioError> {
         Ok(self.folders()?.is_empty())
     }
 
-    /// The folder of a training.
+    /// Returns the folder of a training run.
     ///
     /// # Errors
-    /// [`StudioError::Invalid`] for anything but a training below the folder that is searched.
+    /// [`StudioError::Invalid`] unless `name` is a training run below the searched folder.
     pub fn folder(&self, name: &str) -> Result<PathBuf, StudioError> {
         let run = self.base.join(name);
         let is_below = match (self.base.canonicalize(), run.canonicalize()) {
@@ -141,14 +141,14 @@ impl Trainings {
         Err(StudioError::Invalid(format!("no training is named {name}")))
     }
 
-    /// The rows of a training's log, or means of successive ones.
+    /// Returns the log rows of a training run, or means of successive rows.
     pub fn log(&self, name: &str) -> Result<Vec<LogRow>, StudioError> {
         let rows = read_log(&self.folder(name)?.join(LOG_FILE))?;
         let together = rows.len().div_ceil(MOST_ROWS).max(1);
         Ok(rows.chunks(together).map(mean).collect())
     }
 
-    /// The folders of all trainings. Folders whose entries have not changed since the last search are not read again.
+    /// Returns the folders of all training runs. Folders whose entries have not changed since the last search are not read again.
     fn folders(&self) -> Result<Vec<PathBuf>, StudioError> {
         let mut known = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
         let mut search = Search {
@@ -195,7 +195,7 @@ impl Trainings {
         state
     }
 
-    /// What a log holds, which is read again only when its length has changed.
+    /// Returns the contents of a log, which is read again only if its length has changed.
     fn known_log(&self, file: &Path) -> Result<KnownLog, FileError> {
         let bytes = std::fs::metadata(file).map_or(0, |metadata| metadata.len());
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
@@ -214,15 +214,15 @@ impl Trainings {
     }
 }
 
-/// Whether a folder is that of a training.
+/// Whether a folder is that of a training run.
 pub(crate) fn is_training(folder: &Path) -> bool {
     folder.join(CONFIG_FILE).exists() && folder.join(LOG_FILE).exists()
 }
 
-/// A folder that changed less than this ago is read again: a later change may leave it the same time.
+/// Age below which a changed folder is read again: another change may leave the same modification time.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// A search for trainings, with what the last one knew of each folder.
+/// A search for training runs, with the folders known from the previous one.
 struct Search {
     before: HashMap<PathBuf, KnownFolder>,
     now: HashMap<PathBuf, KnownFolder>,
@@ -230,13 +230,13 @@ struct Search {
 }
 
 impl Search {
-    /// Adds a training, or those at most `depth` folders below; what is below a training or a dataset is not looked at.
+    /// Adds a training run, or those at most `depth` folders below; does not search below a training run or a dataset.
     fn below(&mut self, folder: &Path, depth: usize) -> std::io::Result<()> {
         match self.held(folder)? {
             Held::Training => self.found.push(folder.to_owned()),
             Held::Folders(below) if depth > 0 => {
                 for folder in below {
-                    // A folder that cannot be read, or is gone again, holds no training to show.
+                    // A folder that cannot be read, or was removed, holds no training run to show.
                     let _ = self.below(&folder, depth - 1);
                 }
             }
@@ -286,7 +286,7 @@ fn silent_s(log: &Path) -> Option<f64> {
     Some(silent.unwrap_or_default().as_secs_f64())
 }
 
-/// One row for several successive ones: their last step, and the mean of each scalar over the rows that have it.
+/// Averages successive rows: returns their last step and the mean of each scalar over the rows that have it.
 fn mean(rows: &[LogRow]) -> LogRow {
     let mut sums: BTreeMap<&String, (f64, f64)> = BTreeMap::new();
     for (tag, value) in rows.iter().flat_map(|row| &row.scalars) {
@@ -348,7 +348,7 @@ mod tests {
     fn trainings_that_come_and_go_are_found_at_the_next_search() {
         let root = tempfile::tempdir().unwrap();
         let at = |name: &str| root.path().join(name);
-        // As if written long ago, so that the search keeps what they hold.
+        // Sets an old modification time, so that the search caches the folders.
         let age = |name: &str| {
             let folder = std::fs::File::open(at(name)).unwrap();
             let long_ago = SystemTime::now() - Duration::from_secs(100);
@@ -366,7 +366,7 @@ mod tests {
         assert_eq!(names(&trainings), ["group/a", "group/b"]);
         std::fs::remove_file(at("group/a").join(LOG_FILE)).unwrap();
         assert_eq!(names(&trainings), ["group/b"]);
-        // One that settled is not read again: this one became a training without a change of its time.
+        // An older folder is not read again: this one became a training run without a change of its time.
         std::fs::create_dir(at("late")).unwrap();
         age("late");
         assert_eq!(names(&trainings), ["group/b"]);
@@ -400,7 +400,7 @@ mod tests {
         assert_eq!(rows.len(), 1000);
         assert_eq!(rows[0].step, 3);
         assert_eq!(rows[0].scalars["training/loss"], 2.0);
-        // Of steps 998 to 1000, the evaluation is not diluted by rows without one.
+        // For steps 998 to 1000, the mean ignores rows without an evaluation.
         assert_eq!(rows[333].scalars["evaluation/mae"], 0.5);
         let state = &trainings.states().unwrap()[0];
         assert_eq!((state.step, state.finished), (3000, false));

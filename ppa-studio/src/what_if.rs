@@ -1,4 +1,4 @@
-//! What the sliders of the page change in a plan.
+//! Changes of a plan by the sliders of the page.
 
 use ppa_dataset::BodyShape;
 use ppa_depth::{RigError, RigSpec};
@@ -9,41 +9,41 @@ use serde::{Deserialize, Serialize};
 use crate::camera_move::CameraMove;
 use crate::error::StudioError;
 
-/// A pose and an exposure. Keys that are left out are those of the plan.
+/// A pose and an exposure. The plan gives the values of absent keys.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct WhatIf {
     /// Medial rotation.
     pub angle_deg: f64,
-    /// How deep the distal contact sinks in.
+    /// Depth to which the distal contact sinks in.
     pub distal_mm: Option<f64>,
-    /// How deep the proximal contact sinks in.
+    /// Depth to which the proximal contact sinks in.
     pub proximal_mm: Option<f64>,
-    /// Tilt of the limb; above 0 the proximal end is lifted.
+    /// Tilt of the limb; positive if the proximal end is raised.
     pub tilt_deg: Option<f64>,
-    /// From the joint to the central beam, across the table.
+    /// Offset from the joint to the central beam, across the table.
     pub beam_across_mm: Option<f64>,
-    /// From the joint to the central beam, towards the head.
+    /// Offset from the joint to the central beam, towards the head.
     pub beam_along_mm: Option<f64>,
-    /// Body shape that the depth cameras see; that of the scan if left out.
+    /// Body shape seen by the depth cameras; that of the scan if absent.
     pub shape: Option<BodyShape>,
-    /// Whether the depth cameras have the errors of an Azure Kinect.
+    /// Whether the depth images have the errors of an Azure Kinect.
     pub sensor: bool,
-    /// An examination with its usual exposure; the keys below change it.
+    /// Name of an examination with its usual exposure; the keys below override it.
     pub technique: Option<String>,
     pub kvp: Option<f64>,
     /// Filters, `MATERIAL:mm`.
     pub filters: Option<Vec<String>>,
     pub mas: Option<f64>,
     pub exposure_index: Option<f64>,
-    /// An anti-scatter grid.
+    /// Whether there is an anti-scatter grid.
     pub grid: Option<bool>,
-    /// How the left and the right camera are moved.
+    /// Moves of the left and the right camera.
     pub cameras: Option<[CameraMove; 2]>,
 }
 
 impl WhatIf {
-    /// The plan with these changes.
+    /// Returns the plan with these changes.
     pub fn plan(&self, plan: &Plan) -> Result<Plan, StudioError> {
         let mut plan = plan.clone();
         let sinks = &mut plan.soft_tissue;
@@ -84,7 +84,7 @@ impl WhatIf {
             Some(false) => xray.receptor.grid = None,
             _ => {}
         }
-        // The page shows images while they are computed, which the analog engine cannot do.
+        // The page shows images during their computation, which the analog engine does not support.
         xray.analog = None;
         plan.check_settings().map_err(StudioError::Invalid)?;
         Ok(plan)
@@ -92,7 +92,7 @@ impl WhatIf {
 }
 
 impl WhatIf {
-    /// Whether it has changes that no option of a command makes.
+    /// Whether there are changes that no command option can make.
     pub fn needs_plan(&self) -> bool {
         self.distal_mm.is_some()
             || self.proximal_mm.is_some()
@@ -105,7 +105,7 @@ impl WhatIf {
     }
 }
 
-/// A rig whose left and right camera are moved.
+/// Returns the rig with its left and right camera moved.
 fn moved(rig: Result<RigSpec, RigError>, moves: &[CameraMove; 2]) -> Result<RigSpec, StudioError> {
     let mut rig = rig.map_err(SceneSetupError::from)?;
     let cameras = [("left", &mut rig.left), ("right", &mut rig.right)];
@@ -117,7 +117,7 @@ fn moved(rig: Result<RigSpec, RigError>, moves: &[CameraMove; 2]) -> Result<RigS
     Ok(rig)
 }
 
-/// A common grid of Bucky tables.
+/// Returns a common grid of Bucky tables.
 fn usual_grid() -> AntiScatterGrid {
     AntiScatterGrid::new(8.0, 40.0).with_focus_mm(1100.0)
 }

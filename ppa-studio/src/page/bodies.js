@@ -1,4 +1,4 @@
-// What was removed from the scan, in colour beside the skin in step 2, and clicks on bodies in three dimensions.
+// Parts removed from the scan, in colour next to the skin in step 2, and clicks on bodies in the 3D view.
 
 import { loadRemoved } from "/page/surface.js";
 
@@ -7,20 +7,20 @@ const byId = (id) => document.getElementById(id);
 export class Bodies {
   constructor(store, view, actions) {
     Object.assign(this, { store, view, actions, on: false });
-    // What was removed, asked for once for each limb.
+    // Surface of the removed parts, requested once for each limb.
     this.removed = null;
     this.button = byId("body-pick");
     this.button.addEventListener("click", () => this.set(!this.on));
   }
 
-  // Clicks are on bodies, or set the crosshair again.
+  // Makes clicks pick bodies, or set the crosshair again.
   set(on) {
     this.on = on;
     this.button.setAttribute("aria-pressed", String(on));
     return this.show();
   }
 
-  // Another limb, or another skin of it.
+  // Called for another limb, or another skin of it.
   changed() {
     this.removed = null;
     this.view.showRemoved(null);
@@ -31,7 +31,7 @@ export class Bodies {
     return this.store.step === "skin" && (this.store.showRemoved || this.on);
   }
 
-  // Shows what was removed, or hides it.
+  // Shows or hides the removed parts.
   async show() {
     if (!this.store.doc) return;
     let surface = null;
@@ -47,14 +47,14 @@ export class Bodies {
       } finally {
         this.button.ariaBusy = null;
       }
-      // Of another limb by now.
+      // The limb has changed meanwhile.
       if (asked !== this.removed) return;
     }
     this.view.showRemoved(this.wanted() ? surface : null);
     this.view.draw();
   }
 
-  // Whether a click was one on a body; the point lies inside it.
+  // Handles a click on a body, with a point inside it. Returns whether the click was for this panel.
   picked(point) {
     if (!this.on) return false;
     if (this.button.ariaBusy) return true;

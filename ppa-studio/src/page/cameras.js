@@ -1,4 +1,4 @@
-// Sliders, and places in the room to drag, that move the cameras from their places in the plan.
+// Sliders and handles in the room that move the cameras from their places in the plan.
 
 import { element } from "/page/elements.js";
 import { add, fixed, inverse, rotate, sub, transform, rotatedAbout } from "/page/geometry.js";
@@ -7,7 +7,7 @@ const byId = (id) => document.getElementById(id);
 
 const CAMERAS = ["left", "right"];
 
-// Where a slider's value goes: the key of a move, and the place in it.
+// Destination of a slider's value: the key of a move, and the index in it.
 const SLIDERS = [
   { label: "x", unit: " mm", key: "shift_mm", at: 0, most: 400, step: 5 },
   { label: "y", unit: " mm", key: "shift_mm", at: 1, most: 400, step: 5 },
@@ -17,10 +17,10 @@ const SLIDERS = [
   { label: "Roll", unit: "°", key: "turn_deg", at: 0, most: 180, step: 1 },
 ];
 
-// Distance from a camera to the place at which it is aimed: nearer than the limb, at which both cameras look.
+// Distance from a camera to its aim point: nearer than the limb, at which both cameras look.
 const AIM_MM = 600;
 
-// The place at which a camera is aimed.
+// Aim point of a camera.
 export const aim = ({ room_from_camera }) => transform(room_from_camera, [0, 0, AIM_MM]);
 
 const still = () => ({ shift_mm: [0, 0, 0], turn_deg: [0, 0, 0] });
@@ -71,14 +71,14 @@ export class CameraForm {
     return row;
   }
 
-  // Of both cameras; nothing while both are where the plan has them.
+  // Returns the moves of both cameras; undefined if both are at their places in the plan.
   moves() {
     const moved = this.values.some(({ shift_mm, turn_deg }) => [...shift_mm, ...turn_deg].some((value) => value !== 0));
     return moved ? structuredClone(this.values) : undefined;
   }
 
-  // What can be dragged across the line of sight: a camera, which shifts it, and the place at which it is aimed, which pans and tilts it.
-  // `room` was computed with the moves `made`.
+  // Returns the handles that are dragged across the line of sight: the camera, which shifts it, and its aim point, which pans and
+  // tilts it. `room` was computed with the moves `made`.
   handles(room, made) {
     const ctFromRoom = inverse(room.room_from_ct);
     return room.cameras.flatMap((camera, i) => {
@@ -98,12 +98,12 @@ export class CameraForm {
   }
 }
 
-// A camera that is moved by `by` mm along the axes of the device.
+// Returns the shift of a camera after a move by `by` mm along the axes of the device.
 function shifted({ shift_mm }, by) {
   return { shift_mm: add(shift_mm, by).map(Math.round) };
 }
 
-// A camera whose view goes through a place in its frame; the roll stays.
+// Returns the rotations that aim a camera at a place in its frame; the roll stays.
 function aimed({ turn_deg }, place) {
   const [roll, tilt, pan] = turn_deg;
   const [x, y, z] = rotatedAbout(rotatedAbout(rotatedAbout(place, 2, roll), 0, tilt), 1, pan);

@@ -1,12 +1,12 @@
-// Charts of points, as SVG: lines, spreads, and points that can be clicked.
+// SVG charts: lines, spreads, and points that can be clicked.
 
 const SPACE = "http://www.w3.org/2000/svg";
 const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [440, 250, 52, 12, 12, 36];
 
-// Colours that colour-blind people tell apart (Okabe and Ito), light enough for the dark page.
+// Colours for colour-blind readers (Okabe and Ito), light enough for the dark page.
 const COLOURS = ["#56b4e9", "#e69f00", "#2fc39b", "#f0e442", "#cc79a7", "#ff8a4c", "#9fb4ff", "#e8e8e8"];
 
-// When the colours are used up, dashes and the shape of the points tell series apart.
+// When the colours repeat, dashes and point shapes distinguish the series.
 const MARKS = [
   { shape: "circle", dashes: "none" },
   { shape: "square", dashes: "7 3" },
@@ -14,15 +14,15 @@ const MARKS = [
   { shape: "diamond", dashes: "10 3 2 3" },
 ];
 
-// Series that look different from each other.
+// Maximum number of series with different styles.
 export const MOST_SERIES = COLOURS.length * MARKS.length;
 
-// How the series of a number looks: { colour, shape, dashes }.
+// Style of a series by its number: { colour, shape, dashes }.
 export function styleOf(number) {
   return { colour: COLOURS[number % COLOURS.length], ...MARKS[Math.floor(number / COLOURS.length) % MARKS.length] };
 }
 
-// More points than these are drawn as a line only.
+// Maximum number of points in a chart; with more, only lines are drawn.
 const MOST_POINTS = 3000;
 
 function node(name, attributes, content = "") {
@@ -51,7 +51,8 @@ function range(values) {
 
 export const ROTATION = "medial rotation, degrees";
 
-// `axes`: { x, y }, what they show; `series`: { style, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked`, if there is one, with what it is of.
+// `axes`: { x, y }, their labels; `series`: { style, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked`,
+// if given, with `of`.
 export function chart(title, axes, series, yRange, picked) {
   const all = series.flatMap((one) => one.points);
   const svg = node("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title}, ${axes.y}, against ${axes.x}` });
@@ -90,14 +91,14 @@ export function chart(title, axes, series, yRange, picked) {
   return svg;
 }
 
-// A point of a series, about as large as a circle of radius `r`.
+// Draws a point of a series, about as large as a circle of radius `r`.
 function drawn({ colour, shape }, x, y, r) {
   if (shape === "circle") return node("circle", { cx: x, cy: y, r, fill: colour });
   const corners = { square: [[-1, -1], [1, -1], [1, 1], [-1, 1]], triangle: [[0, -1.3], [1.2, 0.9], [-1.2, 0.9]], diamond: [[0, -1.4], [1.4, 0], [0, 1.4], [-1.4, 0]] }[shape];
   return node("polygon", { points: corners.map(([dx, dy]) => `${x + r * dx},${y + r * dy}`).join(" "), fill: colour });
 }
 
-// A piece of the line of a series with a point on it.
+// Legend mark of a series: a piece of its line with a point.
 export function mark(style) {
   const svg = node("svg", { viewBox: "0 0 28 10", "aria-hidden": "true", class: "mark" });
   svg.append(node("path", { d: "M0 5H28", fill: "none", stroke: style.colour, "stroke-width": 1.6, "stroke-dasharray": style.dashes }), drawn(style, 14, 5, 3.4));

@@ -1,27 +1,27 @@
-// The part of the scan that is used: a box of voxels with edges to drag and fields to type.
+// Crop of the scan: a box of voxels with edges to drag and input fields.
 
 import { element } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
 
 const COLOUR = "#ffb454";
-// Nearer than this a pointer holds an edge, CSS pixels.
+// Distance within which the pointer grabs an edge, CSS pixels.
 const GRAB_PX = 9;
 
 const whole = ({ size }) => ({ low: [0, 0, 0], high: [...size] });
 
-// The box that the case has, all of the scan at first, or nothing while nobody crops.
+// Returns the box of the case, initially the entire scan; null if there is no crop.
 export function box(store) {
   if (store.doc.crop) return store.doc.crop;
   return store.cropping ? whole(store.doc.grid) : null;
 }
 
-// What the case is to hold: nothing for all of the scan.
+// Returns the crop of the case: null for the entire scan.
 export function cropOf(store, shown) {
   return JSON.stringify(shown) === JSON.stringify(whole(store.doc.grid)) ? null : shown;
 }
 
-// Where the edges of a box lie in a slice, CSS pixels: [left or right, ...] and [upper or lower, ...], low end first.
+// Returns the edges of a box in a slice, CSS pixels: [left or right, ...] and [upper or lower, ...], low end first.
 function edges(view, { low, high }, l) {
   const corner = (end) => view.toCanvas([end[view.column] - 0.5, end[view.row] - 0.5], l);
   const [[x0, y0], [x1, y1]] = [corner(low), corner(high)];
@@ -37,7 +37,7 @@ export function drawCrop(context, view, shown, l) {
   context.setLineDash([]);
 }
 
-// The edge under the pointer: voxel axis, end, and where the pointer is beside the edge.
+// Returns the edge under the pointer: voxel axis, end, and the offset of the pointer from the edge.
 export function grabCrop(view, shown, at, l) {
   const { x, y } = edges(view, shown, l);
   const within = (value, ends) => value > Math.min(...ends) - GRAB_PX && value < Math.max(...ends) + GRAB_PX;
@@ -48,7 +48,7 @@ export function grabCrop(view, shown, at, l) {
   return null;
 }
 
-// The box with an edge before a voxel of an axis; at least a voxel is left.
+// Returns the box with an edge moved to before a voxel of an axis; at least one voxel is left.
 export function moveCrop({ size }, shown, { cropAxis, end }, border) {
   const next = { low: [...shown.low], high: [...shown.high] };
   if (end === "low") next.low[cropAxis] = Math.max(0, Math.min(next.high[cropAxis] - 1, border));
@@ -57,7 +57,7 @@ export function moveCrop({ size }, shown, { cropAxis, end }, border) {
 }
 
 export class CropPanel {
-  // `actions.crop` takes a box, or null for all of the scan; `actions.redraw` draws the slices again.
+  // `actions.crop` takes a box, or null for the entire scan; `actions.redraw` redraws the slices.
   constructor(store, actions) {
     this.store = store;
     this.actions = actions;
@@ -85,7 +85,7 @@ export class CropPanel {
     return row;
   }
 
-  // The last voxel is typed, the box ends behind it.
+  // The user types the last voxel; the box ends after it.
   typed(axis, end, value) {
     // An empty field changes nothing.
     if (Number.isNaN(value)) return this.show();

@@ -1,4 +1,4 @@
-// Balls of the scan that are cut off, in step 2: a list, and circles in the slices.
+// Balls cut off from the scan in step 2: a list, and circles in the slices.
 
 import { button, element } from "/page/elements.js";
 import { fixed, inverse, point, transform } from "/page/geometry.js";
@@ -7,7 +7,7 @@ const byId = (id) => document.getElementById(id);
 
 const COLOUR = "#ff9419";
 
-// Circles of a slice: those of the balls that are cut off, and dashed the one that would be.
+// Draws the circles of a slice: those of the balls cut off, and dashed that of the next ball.
 export function drawCuts(context, view, l) {
   const { doc, cursor, ball } = view.store;
   const voxelFromCt = inverse(doc.grid.ct_from_voxel);
@@ -19,7 +19,7 @@ export function drawCuts(context, view, l) {
   context.setLineDash([]);
 }
 
-// The section of a ball with the slice. Axes of voxels are taken to be at right angles.
+// Draws the section of a ball with the slice. Assumes orthogonal voxel axes.
 function circle(context, view, l, { voxel, radius_mm }) {
   const { spacing_mm } = view.store.doc.grid;
   const off_mm = (voxel[view.axis] - view.index()) * spacing_mm[view.axis];
@@ -34,7 +34,7 @@ function circle(context, view, l, { voxel, radius_mm }) {
 }
 
 export class CutPanel {
-  // `actions.remove` takes the balls to cut off, `actions.redraw` draws the slices again, `actions.crosshair` is a place in the scan, mm.
+  // `actions.remove` takes the balls to cut off, `actions.redraw` redraws the slices, `actions.crosshair` returns a place in the scan, mm.
   constructor(store, actions) {
     Object.assign(this, { store, actions, shown: 0 });
     byId("cut-radius").addEventListener("input", () => this.changed());
@@ -45,7 +45,7 @@ export class CutPanel {
     });
   }
 
-  // Another ball would be cut off, or none.
+  // The next ball has changed, or there is none.
   changed() {
     byId("cut-radius-value").textContent = byId("cut-radius").value;
     this.store.ball = byId("cut").open ? Number(byId("cut-radius").value) : null;

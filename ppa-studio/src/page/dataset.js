@@ -1,4 +1,4 @@
-// The dataset: quality of its poses with filters, outliers, images of a pose, findings and splits.
+// The dataset: quality of its poses, with filters, outliers, images of a pose, findings and splits.
 
 import { Refused, getBytes, getJson, postJson } from "/page/server.js";
 import { button, commandRows, element, table } from "/page/elements.js";
@@ -7,7 +7,7 @@ import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
-// Outliers that are listed.
+// Maximum number of listed outliers and flaws.
 const LISTED = 50;
 
 const CHARTS = [
@@ -70,7 +70,7 @@ export class DatasetPanel {
     select.value = names.has(before) ? before : "";
   }
 
-  // Poses that the filters leave.
+  // Returns the poses that pass the filters.
   chosen() {
     const [limb, shape] = [byId("filter-limb").value, byId("filter-shape").value];
     const end = (id, other) => (byId(id).value === "" ? other : Number(byId(id).value));
@@ -138,7 +138,7 @@ export class DatasetPanel {
     byId("splits").replaceChildren(rows.length ? table(["Split", "Persons"], rows) : element("p", "none"));
   }
 
-  // The pose of the filters that is nearest to an angle.
+  // Shows the filtered pose nearest to an angle.
   nearest() {
     const wanted = Number(byId("pose-angle").value);
     const [first, ...others] = this.chosen();
@@ -190,7 +190,7 @@ export class DatasetPanel {
     if (before) URL.revokeObjectURL(before);
   }
 
-  // Takes as long as decoding all images does.
+  // Slow: decodes all images.
   async check() {
     byId("check-text").textContent = "decoding all images …";
     try {

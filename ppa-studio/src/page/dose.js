@@ -1,4 +1,4 @@
-// Absorbed dose of the exposure that is shown.
+// Absorbed dose of the displayed exposure.
 
 import { post } from "/page/server.js";
 import { table } from "/page/elements.js";
@@ -12,7 +12,7 @@ export class DoseTable {
     byId("dose-begin").addEventListener("click", () => this.begin());
   }
 
-  // The exposure has changed, or is not shown any more.
+  // The exposure has changed or is no longer shown.
   clear() {
     this.following?.abort();
     this.following = null;
@@ -21,7 +21,7 @@ export class DoseTable {
     byId("dose-table").replaceChildren();
   }
 
-  // The radiograph is whole: its tube load, if it has one.
+  // Enables the dose when the radiograph is complete, with its tube load, if any.
   offer(mas) {
     this.mas = mas;
     byId("dose-begin").disabled = false;
@@ -47,7 +47,7 @@ export class DoseTable {
   }
 
   show({ histories, histories_per_mas, matter }) {
-    // Without the fluence of the spectrum there is only the dose of a photon.
+    // If the fluence of the spectrum is unknown, only the dose per photon is known.
     const [unit, photons] = histories_per_mas ? ["µGy per mAs", 1e6 * histories_per_mas] : ["aGy per photon", 1e18];
     const heads = ["Matter", "g", unit];
     const load = histories_per_mas && this.mas;

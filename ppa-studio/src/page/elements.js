@@ -1,4 +1,4 @@
-// Small elements that several steps show.
+// Small elements shared by several steps.
 
 export function element(name, text = "", attributes = {}) {
   const made = document.createElement(name);
@@ -26,7 +26,7 @@ export function commandRows(commands) {
   });
 }
 
-// Cells are texts, or elements.
+// Cells are texts or elements.
 export function table(heads, rows) {
   const made = element("table");
   const head = element("tr");

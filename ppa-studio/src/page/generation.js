@@ -6,7 +6,7 @@ import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
-// Pauses between questions about a run, ms: none is asked while nothing runs.
+// Polling intervals of a run, ms; there is no polling while nothing runs.
 const PROGRESS_MS = 1000;
 const SHEET_MS = 4000;
 
@@ -33,7 +33,7 @@ export class GenerationPanel {
     byId("sheet-limb").addEventListener("change", () => this.sheet());
   }
 
-  // The step is shown, or its dataset is another one.
+  // Called when the step is shown or its dataset has changed.
   async show() {
     clearTimeout(this.timer);
     const folder = this.actions.folder();
@@ -105,7 +105,7 @@ export class GenerationPanel {
     select.replaceChildren(...limbs.map(({ patient, side }) => new Option(`patient ${patient} ${side === "l" ? "left" : "right"}`, `${patient}/${side}`)));
   }
 
-  // The contact sheet follows the poses that are made, at most every few seconds.
+  // Updates the contact sheet with the poses made so far, at most every few seconds.
   async sheet() {
     const limb = byId("sheet-limb").value;
     const made = this.state?.made ?? 0;
@@ -164,7 +164,7 @@ export class GenerationPanel {
     }
   }
 
-  // Said where the person looks.
+  // Shows the refusal next to the controls.
   refused(error) {
     if (error instanceof Refused) {
       byId("phase").textContent = error.message;

@@ -1,4 +1,4 @@
-// Vectors of three numbers, and transforms as four rows.
+// Vectors of three numbers and transforms as four rows.
 
 export const add = (a, b) => a.map((x, i) => x + b[i]);
 export const sub = (a, b) => a.map((x, i) => x - b[i]);
@@ -21,7 +21,7 @@ export function rotate(rows, p) {
   return [0, 1, 2].map((i) => dot(rows[i], p));
 }
 
-// A vector that is rotated by an angle about an axis of the frame.
+// Rotates a vector by an angle about an axis of the frame.
 export function rotatedAbout(p, axis, degrees) {
   const [sin, cos] = [Math.sin(degrees * Math.PI / 180), Math.cos(degrees * Math.PI / 180)];
   const [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
@@ -51,7 +51,7 @@ export function planeNormal([a, b, c]) {
   return unit(cross(sub(b, a), sub(c, a)));
 }
 
-// A number with a fixed count of digits, without a minus before zero.
+// Formats a number with fixed decimals, without a minus sign before zero.
 export function fixed(x, digits = 1) {
   const text = x.toFixed(digits);
   return Number(text) === 0 ? (0).toFixed(digits) : text;

@@ -1,5 +1,5 @@
-// Grading by readers: radiographs without names in random order, a grade by key or button, saved at once. The step shows nothing else of
-// the dataset, and has no tab: readers open it by its address.
+// Grading by readers: anonymous radiographs in random order, graded by key or button and saved at once. The step shows nothing
+// else of the dataset and has no tab: readers open it by its address.
 
 import { Refused, getBytes, postJson } from "/page/server.js";
 import { button, commandRows } from "/page/elements.js";
@@ -14,7 +14,7 @@ const GRADES = [
   { grade: 3, key: "key 3, inadequate", codes: ["Digit3", "Numpad3"] },
 ];
 
-// Pictures that are kept: the one before, the one shown, and the next one.
+// Number of pictures in memory: the previous, the current and the next one.
 const KEPT = 3;
 
 export class GradingPanel {
@@ -31,14 +31,14 @@ export class GradingPanel {
     byId("grading-import").addEventListener("click", () => this.import());
     byId("grading-back").addEventListener("click", () => this.go(-1));
     byId("grading-on").addEventListener("click", () => this.go(1));
-    // A grade that is being saved is waited for.
+    // Closing waits for a grade that is being saved.
     byId("grading-end").addEventListener("click", () => { if (!this.saving) byId("grading").close(); });
     byId("grading").addEventListener("cancel", (event) => { if (this.saving) event.preventDefault(); });
     byId("grading").addEventListener("close", () => this.ended());
     document.addEventListener("keydown", (event) => { if (byId("grading").open) this.press(event); });
   }
 
-  // The step is opened for a dataset.
+  // Opens the step for a dataset.
   show(folder) {
     if (this.folder !== folder) {
       this.folder = folder;
@@ -92,7 +92,7 @@ export class GradingPanel {
     }
   }
 
-  // The address of a picture in memory.
+  // Returns the URL of a picture in memory.
   picture(name) {
     if (!this.pictures.has(name)) {
       const { folder, readers } = this.asked;
@@ -105,7 +105,7 @@ export class GradingPanel {
     return this.pictures.get(name);
   }
 
-  // The picture that can be graded: none until it is decoded.
+  // Sets the picture that can be graded: none until it is decoded.
   see(name) {
     this.seen = name;
     byId("grading-picture").setAttribute("aria-busy", String(!name));
@@ -142,7 +142,7 @@ export class GradingPanel {
     this.draw();
   }
 
-  // Only a picture that is seen gets a grade.
+  // Grades the displayed picture only.
   async give(grade) {
     const image = this.seen;
     if (!image || this.saving) return;

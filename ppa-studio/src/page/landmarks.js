@@ -1,4 +1,4 @@
-// Axis, joint and plane: what was found and what was chosen.
+// Axis, joint and plane: found and chosen landmarks.
 
 import { button as elementButton, element } from "/page/elements.js";
 import { COLOURS } from "/page/slices.js";
@@ -14,7 +14,7 @@ export class LandmarkPanel {
     this.store = store;
     this.actions = actions;
     this.picking = null;
-    // Landmarks while they are dragged in three dimensions.
+    // Landmarks while they are dragged in the 3D view.
     this.moving = null;
     byId("limb-choice").addEventListener("change", (event) => actions.choose({ limb: event.target.value || null }));
     byId("axis-source").addEventListener("change", (event) => actions.choose({ axis_source: event.target.value }));
@@ -58,7 +58,7 @@ export class LandmarkPanel {
     [...byId("picks").children].forEach((button, i) => button.setAttribute("aria-pressed", String(i === corner)));
   }
 
-  // A point of the skin was clicked. Returns whether it was for this panel.
+  // Handles a click on the skin. Returns whether it was for this panel.
   picked(place) {
     if (this.picking === null) return false;
     const corner = this.picking;
@@ -75,7 +75,7 @@ export class LandmarkPanel {
     return this.store.doc.landmarks.plane_points.map((p, i) => (i === corner ? place : p));
   }
 
-  // What can be dragged in three dimensions: the points of the plane along the skin, the joint across the line of sight.
+  // Returns the handles of the 3D view: points of the plane move along the skin, the joint across the line of sight.
   handles() {
     const { landmarks } = this.store.doc;
     const handle = (at, onSkin, changed) => ({
@@ -106,7 +106,7 @@ export class LandmarkPanel {
     byId("landmark-table").tBodies[0].replaceChildren(...this.rows().map((row) => this.row(row)), ...this.truth());
   }
 
-  // The mortise of the built-in phantom, which is known.
+  // Table row with the known mortise of the built-in phantom.
   truth() {
     const { mortise, landmarks } = this.store.doc;
     if (!mortise) return [];
@@ -116,7 +116,7 @@ export class LandmarkPanel {
     return [row];
   }
 
-  // Each landmark with its value, the keys that choose it, and how far it is from what is found.
+  // Returns each landmark with its value, the keys that set it, and its distance from the automatic one.
   rows() {
     const { landmarks: now, automatic } = this.store.doc;
     const away = (text) => (automatic ? text() : "");
@@ -155,7 +155,7 @@ export class LandmarkPanel {
     return row;
   }
 
-  // Lines and points for the view in three dimensions, ct frame.
+  // Returns lines and points for the 3D view, ct frame.
   drawing() {
     const landmarks = { ...this.store.doc.landmarks, ...this.moving };
     const { mortise } = this.store.doc;
@@ -177,7 +177,7 @@ export class LandmarkPanel {
   }
 }
 
-// The name of a landmark, with the colour in which it is drawn.
+// Header cell with the name and the colour of a landmark.
 function head(name, colour) {
   const made = element("th", ` ${name}`, { scope: "row" });
   made.prepend(swatch(colour));

@@ -1,25 +1,25 @@
-// Live use: both cameras' newest frames, and what the networks say of them as an operator needs it.
+// Live use: both cameras' newest frames, and the networks' prediction as advice for the operator.
 
 import { getPicture } from "/page/server.js";
 import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
-// Between an answer and the next question, ms; longer while the program does not answer.
+// Pause between an answer and the next request, ms; longer while the program does not answer.
 const PAUSE_MS = 150;
 const FAILED_MS = 2000;
 
-// How often the age of the frames is looked at, and how long an answer may take, ms.
+// Interval of checks of the frames' age, and timeout of an answer, ms.
 const AGE_MS = 250;
 const PATIENCE_MS = 5000;
 
-// The answer for older frames is no longer that of the pose, s.
+// Age above which frames no longer show the current pose, s.
 const OLD_S = 3;
 
-// Labels below it are diagnostic.
+// Labels below this value are diagnostic.
 const NON_DIAGNOSTIC = 2.5;
 
-// Words for an answer: what to do, why, and the colour of the words.
+// Describes an answer: what to do, why, and the class that sets the colour.
 export function verdict({ prediction, refused }) {
   if (refused !== undefined) return ["Not judged", refused, "none"];
   const { quality, interval, diagnostic, correction_deg } = prediction;
@@ -37,7 +37,7 @@ export class LivePanel {
   constructor(actions) {
     this.actions = actions;
     this.number = 0;
-    // Number of the current display: polls of an earlier one end.
+    // Number of the current display; polls of an earlier one end.
     this.display = 0;
   }
 
@@ -69,7 +69,7 @@ export class LivePanel {
     if (display === this.display) setTimeout(() => display === this.display && this.poll(display), pause);
   }
 
-  // A newer pair, if there is one.
+  // Takes a newer pair, if any.
   take(newest) {
     if (!newest) return;
     const { picture, report } = newest;
@@ -84,7 +84,7 @@ export class LivePanel {
     this.put();
   }
 
-  // The answer, as long as it is that of the pose now.
+  // Shows the answer while it applies to the current pose.
   put() {
     if (this.failure) return this.say("No answer", this.failure, "none");
     if (!this.answer) return this.say("No frames yet", "", "none");
@@ -94,7 +94,7 @@ export class LivePanel {
     else this.say(what, why, kind);
   }
 
-  // Texts that stay are not written again, for screen readers.
+  // Unchanged texts are not rewritten, for screen readers.
   say(what, why, kind) {
     for (const [id, text] of [["live-answer", what], ["live-why", why]]) {
       if (byId(id).textContent !== text) byId(id).textContent = text;

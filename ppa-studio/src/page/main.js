@@ -1,4 +1,4 @@
-// The page: one store, one place that changes it, views that follow.
+// The page: one store, one place that changes it, and views that follow.
 
 import { getJson, newest, onAnswer, postJson } from "/page/server.js";
 import { fixed, inverse, point, transform, IDENTITY } from "/page/geometry.js";
@@ -49,7 +49,7 @@ const generation = new GenerationPanel({
   fail,
   tell,
   folder: () => plan.folder(),
-  // A plan that was in no file has one now.
+  // The plan may have been written to a file now.
   started: () => plan.load(),
 });
 const datasetFolder = () => opened?.dataset ?? plan.folder();
@@ -58,9 +58,9 @@ const grading = new GradingPanel({ fail });
 const training = new TrainingPanel({ fail, tell });
 const live = new LivePanel({ fail, folder: () => opened?.watched });
 let room = null;
-// Whether the view shows the whole limb that is open.
+// Whether the view was framed on the open limb.
 let framed = false;
-// What the program has opened: limb, plan, dataset.
+// What the program has open: limb, plan, dataset.
 let opened = null;
 
 function tell(text) {
@@ -73,7 +73,7 @@ function fail(error) {
   byId("message").textContent = error.message;
 }
 
-// Changes what the program knows, and shows what follows.
+// Sends a change to the program and shows the result.
 async function change(path, body) {
   document.body.setAttribute("aria-busy", "true");
   const slow = setTimeout(() => tell("computing …"), 300);
@@ -92,7 +92,7 @@ async function change(path, body) {
   }
 }
 
-// Landmarks that a person chooses; null leaves one to be found again. Regions and points of the axis exclude each other.
+// Sets landmarks chosen by the user; null lets one be found again. Regions and points of the axis exclude each other.
 function choose(changes) {
   const choices = { ...store.doc.choices, ...changes };
   if (["joint_region", "calf_region", "axis_source"].some((key) => changes[key])) delete choices.axis;
@@ -114,7 +114,7 @@ async function show(doc) {
   if (!before) setPlace(doc.landmarks.joint_centre);
   const skinChanged = !before || before.iso_hu !== doc.iso_hu || before.side !== doc.side
     || JSON.stringify(before.report) !== JSON.stringify(doc.report);
-  // Bumps lie where the landmarks say.
+  // The landmarks determine the places of bumps.
   const shapeChanged = shapes.asked && JSON.stringify(before?.landmarks) !== JSON.stringify(doc.landmarks);
   if (skinChanged) slices.forEach((view) => view.forget());
   showScan(doc, actions);
@@ -141,7 +141,7 @@ async function showSurface(first) {
   framed = true;
 }
 
-// While the slider moves: everything in the scan at this HU. The limb follows when it is let go.
+// Shows everything in the scan at this HU while the slider moves. The limb follows when the slider is released.
 async function showSurfaceAt(isoHu) {
   try {
     const surface = await surfaceAt(isoHu);
@@ -170,7 +170,7 @@ function showCommands() {
   byId("command-list").replaceChildren(...commandRows([store.doc.commands.prepare]));
 }
 
-// The command that asks the networks follows those of the images that it reads.
+// Shows the command of the prediction after those of the images that it reads.
 function showPrediction(command) {
   byId("command-list").querySelector(".prediction")?.remove();
   if (!command || store.step !== "whatif") return;
@@ -199,12 +199,12 @@ function setCursor(voxel) {
   slices.forEach((view) => view.update());
 }
 
-// The crosshair at a place in the scan, mm.
+// Sets the crosshair to a place in the scan, mm.
 function setPlace(place) {
   setCursor(transform(inverse(store.doc.grid.ct_from_voxel), place));
 }
 
-// The place of the crosshair in the scan, mm.
+// Returns the place of the crosshair in the scan, mm.
 function crosshair() {
   return transform(store.doc.grid.ct_from_voxel, store.cursor).map((x) => Math.round(10 * x) / 10);
 }
@@ -222,7 +222,7 @@ function showReading(reading) {
   byId("pointer").textContent = reading ? `${reading.hu} HU at ${point(reading.place)} mm (LPS), voxel ${reading.voxel.join(", ")}` : "outside the scan";
 }
 
-// A click on the surface: a landmark, or the crosshair.
+// Handles a click on the surface: a landmark, a body or the crosshair.
 function picked(place, inside) {
   if (store.step === "landmarks" && landmarks.picked(place)) return;
   if (bodies.picked(inside)) return;
@@ -237,7 +237,7 @@ function showRoom(next, handles) {
 }
 
 function go(step) {
-  // The panel of another step is read from its beginning.
+  // Scrolls the panel of another step to its top.
   if (store.step !== step) document.querySelector("aside").scrollTop = 0;
   store.step = step;
   bodies.set(false);
@@ -278,7 +278,7 @@ async function showGeneration() {
   await generation.show();
 }
 
-// Forecast and progress are of the plan as it is now, and the sliders of step 5 show what it says.
+// Updates forecast and progress and the sliders of step 5 for the changed plan.
 async function planChanged() {
   if (store.step === "generation") generation.show();
   if (!store.doc) return;
@@ -307,7 +307,7 @@ async function showTraining() {
   await training.show();
 }
 
-// A limb of the dataset was opened: shown as it lies in a pose.
+// Shows a limb opened from the dataset in one of its poses.
 async function openedLimb(doc, angleDeg) {
   store.doc = null;
   allow({ ...opened, limb: true });
@@ -317,7 +317,7 @@ async function openedLimb(doc, angleDeg) {
   go("whatif");
 }
 
-// Steps without anything to show are not offered.
+// Disables steps that have nothing to show.
 function allow(next) {
   opened = next;
   for (const tab of document.querySelectorAll("[role=tab]")) {
@@ -341,7 +341,7 @@ async function begin() {
   if (opened.limb) await show(await getJson("state"));
 }
 
-// The program answers again. One that was started again has what was saved.
+// Called when the program answers again. A restarted program has the saved state.
 async function refresh(restarted) {
   try {
     allow(await getJson("opened"));
@@ -353,7 +353,7 @@ async function refresh(restarted) {
   }
 }
 
-// The step that the address names, or the first one where that has nothing to show.
+// Returns the step in the address, or the first step that has something to show.
 function stepInAddress() {
   const step = location.hash.slice(1);
   const needed = step === "grading" ? "dataset" : step;

@@ -1,11 +1,11 @@
-// The form of the plan: a field for each key, as the types of the plan declare them.
+// The form of the plan: a field for each key declared by the types of the plan.
 
 import { Refused, getJson, newest, postJson } from "/page/server.js";
 import { button, element, table } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
 
-// Tables whose keys most plans change.
+// Tables that are open at first: most plans change their keys.
 const OPEN = ["rotation", "shapes", "soft_tissue", "positioning"];
 
 const HINTS = {
@@ -14,15 +14,15 @@ const HINTS = {
 
 const MOST_PATIENT = 2 ** 32 - 1;
 
-// Each gives an element, how the value of a field, or none, is put into it, and the note below its meaning, if there is one.
+// Each returns an element, a function that shows a field's value, and the note below the field's meaning, if any.
 const INPUTS = { name: nameInput, names: namesInput, file: fileInput, rows: rowsInput };
 
-// What holds where no file is chosen.
+// Defaults if no file is chosen.
 const WITHOUT_FILE = { "depth.rig": "built-in Azure Kinect pair", "xray.calibration_file": "built-in table" };
 
 const WRITTEN = " written";
 
-// What a field shows that has no value.
+// Placeholder of a field without a value.
 const withoutValue = ({ default: standard, example }) => standard ?? (example ? `off; such as ${example}` : "off");
 
 function typed(input, set) {
@@ -49,14 +49,14 @@ function nameInput(field, id, set) {
   select.append(standard, ...field.names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
   select.addEventListener("change", () => set(select.value || null));
   return [select, (field) => {
-    // There is no default of cameras while the rig of the plan cannot be read.
+    // Cameras have no default while the rig of the plan cannot be read.
     standard.textContent = field.default === null ? "no default" : `default: ${field.default}`;
     standard.hidden = field.required;
     select.value = field.value ?? "";
   }];
 }
 
-// A file beside the plan, nothing, or what the plan holds instead, and why others are not offered. Files come and go.
+// Choice of a file next to the plan, the default, or the table in the plan; lists unreadable files. The files may change.
 function fileInput(field, id, set) {
   const select = element("select", "", { id, class: "file" });
   const refused = element("ul", "", { id: `${id}:unreadable`, class: "unreadable" });
@@ -90,7 +90,7 @@ function namesInput(field, id, set) {
   }];
 }
 
-// The numbers that a plan accepts, in words.
+// Describes the range of numbers that a plan accepts.
 function limitsText(limits) {
   if (!limits) return "";
   const end = (limit, included, excluded) => limit && `${limit.included ? included : excluded} ${Number(limit.value.toPrecision(6))}`;
@@ -129,14 +129,14 @@ export class PlanPanel {
   }
 
   async change(path, body) {
-    // Limbs are named by their places, which the change may move.
+    // Limbs are identified by their indices, which may change.
     byId("plan-limbs").inert = true;
     try {
       this.show(await postJson(path, body));
       this.actions.tell("");
       this.actions.changed();
     } catch (error) {
-      // What was typed is not in the plan.
+      // Restores the values of the plan.
       if (this.plan) this.show(this.plan);
       this.actions.fail(error);
     } finally {
@@ -180,7 +180,7 @@ export class PlanPanel {
     return item;
   }
 
-  // Keys of a table in a group of its own, which opens and closes. Made once: later changes are put into its fields.
+  // Makes a collapsible group for each table. The groups are made once; later changes update their fields.
   groups(fields) {
     const top = element("div");
     const groups = new Map([["", top]]);
@@ -207,7 +207,7 @@ export class PlanPanel {
     return group;
   }
 
-  // Limits depend on the other settings, so they are asked for when a field is entered.
+  // Limits depend on the other settings, so they are requested when a field gets the focus.
   async showLimits({ key, hint }) {
     try {
       hint.textContent = limitsText(await postJson("plan/limits", { key }));

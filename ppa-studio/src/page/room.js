@@ -1,4 +1,4 @@
-// The room in three dimensions: table, detector, focal spot and view cones.
+// The room in the 3D view: table, detector, focal spot and view cones.
 
 import { aim } from "/page/cameras.js";
 import { facts } from "/page/elements.js";
@@ -14,7 +14,7 @@ export function roomFacts(room) {
 
 const ring = (points) => points.flatMap((p, i) => [p, points[(i + 1) % points.length]]);
 
-// In step 4 at the cameras and the focal spot as well, else at the limb on the table.
+// Frames detector, focal spot and cameras in step 4, otherwise the limb on the table.
 function look(view3d, room) {
   const devices = [...room.detector, room.source, ...room.cameras.map(({ centre }) => centre)];
   if (document.body.dataset.step === "room") view3d.fit(devices);

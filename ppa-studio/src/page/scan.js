@@ -1,4 +1,4 @@
-// What is known of the scan and of the skin in it.
+// Facts about the scan and its skin.
 
 import { button, element, facts } from "/page/elements.js";
 import { fixed, point } from "/page/geometry.js";

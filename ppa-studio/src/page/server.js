@@ -7,22 +7,22 @@ export class Refused extends Error {
   }
 }
 
-// The program may have ended, or the way to it, such as a forwarded port.
+// The program or the connection to it, such as a forwarded port, may have ended.
 const SILENT = "ppa studio does not answer. Check the connection, or start it again: this page continues when it answers. Your changes are saved.";
-// Pause between two attempts to reach a program that does not answer, ms.
+// Pause between attempts to reach a program that does not answer, ms.
 const RETRY_MS = 1000;
 
-// When the program that answers was started.
+// Start time of the answering program.
 let started = null;
 let retrying = false;
 let answers = () => {};
 
-// Calls `call` when the program answers again; the value is true if it was started again since it answered last.
+// Calls `call` when the program answers again; the argument is true if it was restarted since its last answer.
 export function onAnswer(call) {
   answers = call;
 }
 
-// Whether a program that was started again gave an answer.
+// Whether an answer is from a restarted program.
 function isOther(response) {
   const now = response.headers.get("x-started");
   const other = now !== null && started !== null && now !== started;
@@ -84,21 +84,21 @@ export async function postJson(path, body) {
   return (await post(path, body)).json();
 }
 
-// An image with its report.
+// Requests an image with its report.
 export async function postPicture(path, body, signal) {
   const response = await post(path, body, signal);
   const report = JSON.parse(response.headers.get("x-report") ?? "{}");
   return { picture: await response.blob(), report };
 }
 
-// The same from an address that may have no image yet: null then.
+// The same, from a path that may have no image yet: null in that case.
 export async function getPicture(path, signal) {
   const response = await answered(await request(path, { signal }));
   if (response.status === 204) return null;
   return { picture: await response.blob(), report: JSON.parse(response.headers.get("x-report")) };
 }
 
-// Calls `make` for the newest value only: while one call is under way, later values replace each other.
+// Calls `make` for the newest value only: during a call, later values replace each other.
 export function newest(make) {
   let waiting = null;
   let busy = false;

@@ -8,13 +8,13 @@ const byId = (id) => document.getElementById(id);
 export class ShapePanel {
   constructor(store, actions) {
     this.store = store;
-    // What was asked for last: a shape, or nothing for the skin of the scan.
+    // The last request: a shape, or "" for the skin of the scan.
     this.asked = "";
     this.loads = 0;
     byId("skin-shape").addEventListener("change", () => actions.surface());
   }
 
-  // Other steps show the skin of the scan, on which landmarks are placed.
+  // Other steps show the skin of the scan, where landmarks are placed.
   wanted() {
     return this.store.step === "skin" ? byId("skin-shape").value : "";
   }
@@ -23,7 +23,7 @@ export class ShapePanel {
     return this.asked === this.wanted();
   }
 
-  // The surface to show; null if another one was asked for meanwhile.
+  // Loads the surface to show; null if another one was requested meanwhile.
   async load() {
     const wanted = this.wanted();
     const number = ++this.loads;

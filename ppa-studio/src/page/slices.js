@@ -1,11 +1,11 @@
-// Slices of the scan with crosshair, landmarks and what can be dragged.
+// Slices of the scan with crosshair, landmarks and drag handles.
 
 import { getBytes } from "/page/server.js";
 import { box, drawCrop, grabCrop, moveCrop } from "/page/crop.js";
 import { drawCuts } from "/page/cuts.js";
 import { add, dot, inverse, scale, sub, transform } from "/page/geometry.js";
 
-// Nearer than this a pointer holds what it points to, CSS pixels.
+// Distance within which the pointer grabs an object, CSS pixels.
 const GRAB_PX = 9;
 const COLOURS = { axis: "#6cb6ff", joint: "#ff7ad9", plane: "#7ee787", joint_region: "#ffd479", calf_region: "#b8a4ff", mortise: "#f0e442", cross: "#9aa4b2" };
 const LETTERS = [["R", "L"], ["A", "P"], ["F", "H"]];
@@ -30,7 +30,7 @@ export class SliceView {
     this.canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
-  // The document has changed: the mask may be another.
+  // Called when the document has changed, since the mask may differ.
   forget() {
     this.planes.clear();
     this.shownIndex = null;
@@ -40,7 +40,7 @@ export class SliceView {
     return Math.round(this.store.cursor[this.axis]);
   }
 
-  // Voxel axes as directions on the screen: the patient's right at the left, the back below or at the right, the head up.
+  // Maps voxel axes to screen directions: the patient's right at the left, the back below or at the right, the head up.
   orient() {
     const { grid } = this.store.doc;
     const side = (voxelAxis, vertical) => {
@@ -71,14 +71,14 @@ export class SliceView {
         return this.actions.fail(error);
       }
       if (revision !== this.store.doc.revision) return;
-      // A few slices around the crosshair are enough.
+      // A cache of a few slices around the crosshair is enough.
       if (this.planes.size > 40) this.planes.clear();
       this.planes.set(index, plane);
     }
     if (index === this.index()) this.draw();
   }
 
-  // Places on the canvas of the slice: offset and size of a voxel in CSS pixels.
+  // Layout of the slice on the canvas: offset and voxel size in CSS pixels.
   layout() {
     const { size, spacing_mm } = this.store.doc.grid;
     const { clientWidth: width, clientHeight: height } = this.canvas;
@@ -89,7 +89,7 @@ export class SliceView {
     return { columns, rows, x: (width - w) / 2, y: (height - h) / 2, w, h, stepX: dx * zoom, stepY: dy * zoom };
   }
 
-  // Canvas from voxel indices (column, row), and back.
+  // Conversion of voxel indices (column, row) to canvas coordinates, and back.
   toCanvas([column, row], l = this.layout()) {
     const c = this.across.flip ? l.columns - 1 - column : column;
     const r = this.down.flip ? l.rows - 1 - row : row;
@@ -128,7 +128,7 @@ export class SliceView {
     this.caption.textContent = `${"ijk"[this.axis]} = ${this.index()} of ${size[this.axis]}`;
   }
 
-  // Grey values by the window; outside the limb, what was removed has a colour.
+  // Paints grey values by the window; removed parts outside the limb are coloured.
   paint(plane, l) {
     this.image.width = l.columns;
     this.image.height = l.rows;
@@ -166,7 +166,7 @@ export class SliceView {
     context.setLineDash([]);
   }
 
-  // A point of the ct frame on the canvas, and its distance from the slice, mm.
+  // Projects a point of the ct frame onto the canvas, and returns its distance from the slice, mm.
   project(point, l) {
     const { grid } = this.store.doc;
     const voxel = transform(inverse(grid.ct_from_voxel), point);
@@ -174,7 +174,7 @@ export class SliceView {
     return { at: this.toCanvas([voxel[this.column], voxel[this.row]], l), off: Math.abs(off) };
   }
 
-  // The landmarks as they are, or as they are being dragged.
+  // Returns the landmarks, including one that is being dragged.
   landmarks() {
     return { ...this.store.doc.landmarks, ...this.held?.changed };
   }
@@ -207,7 +207,7 @@ export class SliceView {
     mark(context, joint.at, COLOURS.joint, joint.off < 3, "circle");
   }
 
-  // The line where a region begins or ends: `mm` from the joint along the scan direction.
+  // Returns the line at a border of a region: `mm` from the joint along the scan direction.
   edge(mm, l) {
     const height = (x, y) => this.along(this.toVoxel([x, y], l)) - mm;
     const cut = (x) => {
@@ -235,12 +235,12 @@ export class SliceView {
     context.fillText(this.down.letters[1], width / 2, height - 11);
   }
 
-  // Whether the step shows which part of the scan is used.
+  // Whether the step shows the crop.
   crops() {
     return this.store.step === "scan" || this.store.step === "skin";
   }
 
-  // What lies under the pointer and can be dragged.
+  // Returns the object under the pointer that can be dragged.
   grab(at) {
     if (this.crops() && this.store.cropping) return grabCrop(this, box(this.store), at, this.layout());
     if (this.store.step !== "landmarks") return null;
@@ -279,7 +279,7 @@ export class SliceView {
       this.held.choice = { [key]: range };
       return;
     }
-    // Within the slice; the coordinate across it stays.
+    // Moves within the slice; keeps the coordinate across it.
     const old = corner === undefined ? landmarks[key] : landmarks[key][corner];
     voxel[this.axis] = transform(inverse(grid.ct_from_voxel), old)[this.axis];
     const point = transform(grid.ct_from_voxel, voxel).map((x) => Math.round(10 * x) / 10);
@@ -345,7 +345,7 @@ export class SliceView {
     this.step(by);
   }
 
-  // HU and place under the pointer.
+  // Returns HU and place under the pointer.
   reading(at) {
     const { size, ct_from_voxel } = this.store.doc.grid;
     const voxel = this.toVoxel(at).map(Math.round);

@@ -1,4 +1,4 @@
-// The view in three dimensions without WebGL 2: triangles, lines and points, nearest first, into the pixels of a canvas.
+// The 3D view without WebGL 2: draws triangles, lines and points with a depth buffer into the pixels of a canvas.
 
 const GROUND = [10, 13, 18];
 const OUTWARDS = [255, 115, 13];
@@ -14,7 +14,7 @@ export class SoftwarePainter {
     this.context = canvas.getContext("2d");
   }
 
-  // Everything of a view; `screen` is four rows from the world to clip coordinates.
+  // Draws a view; `screen` has the four rows of the transform from the world to clip coordinates.
   draw(view, screen, eye) {
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     this.canvas.width = width;
@@ -22,7 +22,7 @@ export class SoftwarePainter {
     Object.assign(this, { width, height, screen });
     this.picture = this.context.createImageData(width, height);
     this.pixels = new Uint32Array(this.picture.data.buffer).fill(packed(GROUND));
-    // Nearness: 1 / w in clip coordinates, 0 where nothing is.
+    // Depth buffer of nearness: 1 / w in clip coordinates, 0 for the background.
     this.near = new Float32Array(width * height);
     const { colour } = view;
     const skin = (vertex, light) => packed(this.moved(colour.skin, view, vertex).map((c) => c * light));
@@ -43,7 +43,7 @@ export class SoftwarePainter {
     return mixed(colour, mm > 0 ? OUTWARDS : INWARDS, Math.min(1, Math.abs(mm) / mostMoved));
   }
 
-  // Translucent, over the skin.
+  // Draws the removed parts translucent, over the skin.
   removed({ removed, worldFromCt, colour }, eye) {
     const near = new Float32Array(this.near.length);
     const pixels = new Uint32Array(this.near.length);
@@ -57,14 +57,14 @@ export class SoftwarePainter {
     });
   }
 
-  // Pixel and nearness of a point of the world; nearness is 0 or less behind the eye.
+  // Returns pixel and nearness of a point in the world; nearness is 0 or negative behind the eye.
   project([x, y, z]) {
     const row = ([a, b, c, d]) => a * x + b * y + c * z + d;
     const w = row(this.screen[3]);
     return [(1 + row(this.screen[0]) / w) * this.width / 2, (1 - row(this.screen[1]) / w) * this.height / 2, 1 / w];
   }
 
-  // Each triangle in the colour of its first corner.
+  // Draws each triangle in the colour of its first corner.
   triangles({ positions, normals, corners }, worldFromModel, eye, colourOf, near, pixels) {
     const { width, height } = this;
     const [r0, r1, r2] = worldFromModel;
@@ -107,7 +107,7 @@ export class SoftwarePainter {
     }
   }
 
-  // Of what lies in front of the eye.
+  // Draws the part of a line in front of the eye.
   line(from, to, colour, through) {
     const depth = ([x, y, z]) => this.screen[3][0] * x + this.screen[3][1] * y + this.screen[3][2] * z + this.screen[3][3];
     let [p, q] = [from, to];
@@ -120,7 +120,7 @@ export class SoftwarePainter {
     const [[x0, y0, n0], [x1, y1, n1]] = [this.project(p), this.project(q)];
     const [dx, dy] = [x1 - x0, y1 - y0];
     const steps = Math.ceil(Math.max(Math.abs(dx), Math.abs(dy), 1));
-    // The part of the line on the canvas.
+    // Clips the line to the canvas.
     const inside = [[-dx, x0], [dx, this.width - x0], [-dy, y0], [dy, this.height - y0]];
     let [first, last] = [0, 1];
     for (const [slope, room] of inside) {

@@ -6,17 +6,17 @@ export async function loadSurface() {
   return surfaceOf(await getBytes("skin"));
 }
 
-// What was removed beside the limb and inside it.
+// Loads the surface of the parts removed outside and inside the limb.
 export async function loadRemoved() {
   return surfaceOf(await getBytes("removed"));
 }
 
-// The coarse surface of everything in the scan at a HU.
+// Loads the coarse surface of everything in the scan at a HU.
 export async function surfaceAt(isoHu) {
   return surfaceOf(await (await post("surface_at", { iso_hu: isoHu })).arrayBuffer());
 }
 
-// The skin in a body shape, with how far its vertices moved outwards, mm.
+// Loads the skin in a body shape, with the outward displacements of its vertices, mm.
 export async function loadShape(shape) {
   return surfaceOf(await (await post("body_shape", { shape })).arrayBuffer());
 }
@@ -31,8 +31,8 @@ function surfaceOf(bytes) {
   return { positions, normals, corners, outwards };
 }
 
-// Where a ray first meets a surface, and the next place where it meets the same one, as distances along it; infinite where it does not.
-// Numbers by name, not arrays: it runs through all triangles while a landmark is dragged.
+// Returns the distances along a ray to its first and next intersection with a surface; infinite if there is none.
+// Uses scalars instead of arrays for speed: it tests all triangles while a landmark is dragged.
 export function hit({ positions, corners }, [ox, oy, oz], [dx, dy, dz]) {
   let [nearest, next] = [Infinity, Infinity];
   for (let t = 0; t < corners.length; t += 3) {

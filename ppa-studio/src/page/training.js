@@ -1,4 +1,4 @@
-// Trainings: how far they are, their curves over each other, their errors, and the images with the largest.
+// Training runs: progress, overlaid curves, errors, and the images with the largest errors.
 
 import { Refused, getJson, postJson } from "/page/server.js";
 import { button, commandRows, element, table } from "/page/elements.js";
@@ -7,13 +7,13 @@ import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
-// Between two looks at trainings that run, ms.
+// Polling interval of active training runs, ms.
 const POLL_MS = 2000;
 
-// A training whose log was not written for so long does not run, s.
+// Age of the log above which a training run counts as stopped, s.
 const SILENT_S = 900;
 
-// Trainings that are listed; the filter finds the others.
+// Maximum number of listed training runs; the filter finds the others.
 const LISTED = 100;
 
 const CURVES = [
@@ -51,7 +51,7 @@ export class TrainingPanel {
     byId("training-filter").addEventListener("input", () => this.table());
   }
 
-  // The step is shown, or read again.
+  // Shows or refreshes the step.
   async show() {
     clearTimeout(this.timer);
     this.visible = true;
@@ -61,7 +61,7 @@ export class TrainingPanel {
       byId("training-folder").textContent = folder === "." ? "this folder" : folder;
       this.trainings = trainings;
       this.watch = watch;
-      // At first those that were written last.
+      // Initially chooses the most recently written runs.
       const latest = [...trainings].sort((a, b) => (a.silent_s ?? Infinity) - (b.silent_s ?? Infinity));
       this.chosen ??= latest.slice(0, 4).map(({ name }) => name).sort();
       this.chosen = this.chosen.filter((name) => trainings.some((one) => one.name === name));
@@ -92,7 +92,7 @@ export class TrainingPanel {
     const count = `${found.length} of ${this.trainings.length} training runs, ${finished} finished, ${this.trainings.filter(runs).length} running`;
     if (byId("training-count").textContent !== count) byId("training-count").textContent = count;
     this.commands();
-    // What has not changed stays, and with it the focus.
+    // An unchanged table is not redrawn and so keeps the focus.
     const shown = JSON.stringify([found.slice(0, LISTED).map((one) => [one.name, one.step, one.rows, state(one)]), found.length, this.chosen]);
     if (shown === this.shown) return;
     this.shown = shown;
@@ -104,7 +104,7 @@ export class TrainingPanel {
     if (focused?.startsWith("training-of-")) byId(focused)?.focus();
   }
 
-  // Of what is chosen; the commands of another step stay.
+  // Shows the commands of the chosen runs; leaves the commands of other steps.
   commands() {
     if (!this.visible) return;
     const chosen = this.trainings.filter(({ name, command }) => command && this.chosen.includes(name)).map(({ command }) => command);
@@ -174,7 +174,7 @@ export class TrainingPanel {
     try {
       this.errors.set(name, await postJson("training/errors", { run: name }));
       this.worstOf = name;
-      // At the limit, the training that was chosen last is dropped.
+      // At the limit, drops the run that was chosen last.
       if (!this.chosen.includes(name)) await this.choose([...this.chosen.slice(0, MOST_SERIES - 1), name]);
       this.drawErrors();
       if (!this.visible) return;
@@ -186,7 +186,7 @@ export class TrainingPanel {
     }
   }
 
-  // Of the chosen trainings whose errors are known.
+  // Draws the chosen runs whose errors are known.
   drawErrors() {
     const known = this.chosen.filter((name) => this.errors.has(name));
     byId("training-errors").hidden = known.length === 0;
@@ -211,7 +211,7 @@ export class TrainingPanel {
 
   drawWorst(name) {
     byId("worst-of").textContent = name;
-    // Another address for each computation, since it may find other images.
+    // Each computation uses a new URL, since it may find other images.
     this.drawn = (this.drawn ?? 0) + 1;
     byId("worst").replaceChildren(...this.errors.get(name).worst.map((row, index) => {
       const figure = element("figure");

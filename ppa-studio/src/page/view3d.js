@@ -1,4 +1,4 @@
-// The skin, the landmarks and the room in three dimensions (WebGL 2, or the processor where a browser has none).
+// 3D view of the skin, the landmarks and the room, drawn by WebGL 2, or by the CPU if the browser has no WebGL 2.
 
 import { IDENTITY, add, cross, dot, inverse, norm, rotate, scale, sub, transform, unit } from "/page/geometry.js";
 import { SoftwarePainter } from "/page/software.js";
@@ -36,18 +36,18 @@ void main() {
   pixel = vec4(painted * light, colour.a);
 }`;
 
-// From a point of a surface into what is below it, along the line of sight, at most; half-way through what is thinner.
+// Maximum depth of a picked point below the surface, along the line of sight; half-way through thinner objects.
 const INSIDE_MM = 5;
 
 const SKIN = [0.86, 0.68, 0.58, 1];
-// As in the slices; faint where the skin hides it.
+// Colour as in the slices; faint where hidden by the skin.
 const REMOVED = { colour: [1, 0.58, 0.1], seen: 0.45, hidden: 0.1 };
 
-// A press that moves less is a click.
+// Movement below which a press is a click.
 const CLICK_PX = 4;
-// Nearer than this a pointer holds what it points to, CSS pixels.
+// Distance within which the pointer grabs a handle, CSS pixels.
 const GRAB_PX = 10;
-// What lies deeper below the skin than this is hidden by it.
+// Depth below the skin at which points are hidden by it.
 const HIDDEN_MM = 8;
 
 const FIELD_OF_VIEW = 30 * Math.PI / 180;
@@ -58,7 +58,7 @@ export class View3d {
     this.caption = figure.querySelector("figcaption");
     this.actions = actions;
     this.surface = null;
-    // What was removed, where it is shown with the skin.
+    // Surface of the removed parts, if shown with the skin.
     this.removed = null;
     this.worldFromCt = IDENTITY;
     this.lines = [];
@@ -66,7 +66,7 @@ export class View3d {
     this.turn = { azimuth: -0.6, elevation: 0.25 };
     this.centre = [0, 0, 0];
     this.distance = 1000;
-    // Places that can be dragged: where they are, whether they stay on the skin, and what to do with the place on the way and at the end.
+    // Places that can be dragged: `at`, `onSkin`, `move` for each place on the way, and `drop` for the last one.
     this.handles = [];
     this.gl = this.canvas.getContext("webgl2", { antialias: true });
     if (this.gl) {
@@ -154,7 +154,7 @@ export class View3d {
     this.load(surface, this.buffers?.skin);
   }
 
-  // A second surface, or none.
+  // Sets the second surface, or none.
   showRemoved(surface) {
     this.removed = surface;
     if (surface) this.load(surface, this.buffers?.removed);
@@ -173,7 +173,7 @@ export class View3d {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, surface.corners, gl.STATIC_DRAW);
   }
 
-  // Looks at the whole skin, or at a place in the room.
+  // Frames the skin, or a place in the room.
   frame(centre = null, distance = null) {
     const { low, high } = bounds(this.surface);
     this.centre = centre ?? transform(this.worldFromCt, scale(add(low, high), 0.5));
@@ -181,7 +181,7 @@ export class View3d {
     this.draw();
   }
 
-  // Looks at places in the world so that all are seen.
+  // Frames places in the world so that all are visible.
   fit(places) {
     const axes = [0, 1, 2].map((axis) => places.map((place) => place[axis]));
     this.centre = axes.map((values) => (Math.min(...values) + Math.max(...values)) / 2);
@@ -196,7 +196,7 @@ export class View3d {
     this.draw();
   }
 
-  // Eye, and the directions right, up and backwards on the screen, in the world.
+  // Returns the eye and the directions right, up and backwards on the screen, in the world.
   eye() {
     const { azimuth, elevation } = this.turn;
     const back = [Math.cos(elevation) * Math.sin(azimuth), -Math.cos(elevation) * Math.cos(azimuth), Math.sin(elevation)];
@@ -247,7 +247,7 @@ export class View3d {
     for (const { points, colour, through } of this.points) this.segments(gl.POINTS, points, colour, through);
   }
 
-  // Translucent, over the skin.
+  // Draws the removed parts translucent, over the skin.
   drawRemoved() {
     const { gl } = this;
     gl.uniform1f(this.uniform("mostMoved"), 0);
@@ -275,7 +275,7 @@ export class View3d {
 
   segments(kind, points, colour, through) {
     const { gl } = this;
-    // Landmarks inside the limb are seen through the skin.
+    // Landmarks inside the limb are visible through the skin.
     if (through) gl.disable(gl.DEPTH_TEST); else gl.enable(gl.DEPTH_TEST);
     this.paint([1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16) / 255).concat(1), 0);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.lines);
@@ -306,7 +306,7 @@ export class View3d {
     this.gl.uniformMatrix3fv(this.uniform("eyeFromModel"), false, facing.flat());
   }
 
-  // The line of sight at a place of the canvas, in the ct frame.
+  // Returns the line of sight at a place of the canvas, in the ct frame.
   sight(x, y) {
     const { at, right, up, back } = this.eye();
     const half = Math.tan(FIELD_OF_VIEW / 2);
@@ -317,7 +317,7 @@ export class View3d {
     return { origin: transform(ctFromWorld, at), along: rotate(ctFromWorld, direction), back: rotate(ctFromWorld, back) };
   }
 
-  // The handle under the pointer that can be seen.
+  // Returns the visible handle under the pointer.
   handleAt(x, y) {
     if (!this.surface || this.handles.length === 0) return null;
     const screen = this.screenFromWorld(this.eye());
@@ -328,7 +328,7 @@ export class View3d {
       return w > 0 ? Math.hypot((1 + px / w) * width / 2 - x, (1 - py / w) * height / 2 - y) : Infinity;
     };
     const near = this.handles.filter((handle) => away(handle) < GRAB_PX).sort((a, b) => away(a) - away(b));
-    // A point on the far side would jump to this one.
+    // A handle on the far side would jump to the near side.
     return near.find(({ at, onSkin }) => {
       if (!onSkin) return true;
       const { origin } = this.sight(x, y);
@@ -337,7 +337,7 @@ export class View3d {
     }) ?? null;
   }
 
-  // Where a handle is dragged to: along the skin, or across the line of sight. Nothing where there is no skin.
+  // Drags a handle along the skin or across the line of sight, and returns its place; null if there is no skin.
   drag(handle, x, y) {
     const { origin, along, back } = this.sight(x, y);
     const distance = handle.onSkin ? hit(this.surface, origin, along).nearest : dot(sub(handle.at, origin), back) / dot(along, back);
@@ -347,7 +347,7 @@ export class View3d {
     return place;
   }
 
-  // The point of what is shown under the pointer, and one behind it, in the ct frame.
+  // Picks the surface point under the pointer, and one behind it, in the ct frame.
   pick(x, y) {
     if (!this.surface) return;
     const { origin, along } = this.sight(x, y);

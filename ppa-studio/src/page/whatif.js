@@ -1,4 +1,4 @@
-// Sliders of pose and exposure, and the images that follow them.
+// Sliders for pose and exposure, and the images that follow them.
 
 import { Refused, newest, post, postJson, postPicture } from "/page/server.js";
 import { facts } from "/page/elements.js";
@@ -8,7 +8,7 @@ import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
-// Pause after the last change before a radiograph begins, ms.
+// Delay from the last change to the start of a radiograph, ms.
 const SETTLED_MS = 250;
 
 const SLIDERS = [
@@ -29,10 +29,10 @@ const TECHNIQUES = ["ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbo
 
 const VERDICTS = { yes: "diagnostic", no: "not diagnostic", not_sure: "not sure whether diagnostic" };
 
-// Whether a later request for the same image has replaced the one that failed.
+// Whether a request failed because a later one replaced it.
 const isReplaced = (error) => error instanceof Refused && error.status === 409;
 
-// What networks say of the depth images; nothing if none are open.
+// Describes the networks' answer for the depth images; "" if no networks are open.
 function networkText(answer) {
   if (!answer) return "";
   if (answer.refused) return `Networks: no answer, since ${answer.refused}`;
@@ -85,7 +85,7 @@ export class WhatIfPanel {
     form.append(label);
   }
 
-  // A slider; one that has not been moved shows what the plan says.
+  // Makes a slider, which shows the value of the plan until it is moved.
   slider({ key, label, unit, min, max, step, start }) {
     const row = document.createElement("div");
     row.className = "row";
@@ -115,7 +115,7 @@ export class WhatIfPanel {
     return row;
   }
 
-  // What the plan says, if it is a number that a slider shows.
+  // Returns the value of the plan, if it is a number for a slider.
   planned(key) {
     const planned = this.store.doc?.planned;
     if (!planned) return undefined;
@@ -159,7 +159,7 @@ export class WhatIfPanel {
     return this.store.step === "whatif" || this.store.step === "room";
   }
 
-  // Pose or exposure have changed: everything that shows them follows.
+  // Updates everything that depends on pose or exposure.
   changed() {
     if (!this.store.doc || !this.isShown()) return;
     this.cancelRadiograph();
@@ -206,7 +206,7 @@ export class WhatIfPanel {
     }
   }
 
-  // What both cameras see of the skin near the joint.
+  // Shows both cameras' coverage of the skin near the joint.
   async coverage(whatIf) {
     try {
       const { places, radius_mm, max_angle_deg } = await postJson("coverage", whatIf);
@@ -221,7 +221,7 @@ export class WhatIfPanel {
     }
   }
 
-  // The computed label; without bones in the case there is none.
+  // Shows the computed label; there is none if the case has no bones.
   async label(whatIf) {
     try {
       const label = await postJson("label", whatIf);
@@ -233,7 +233,7 @@ export class WhatIfPanel {
     }
   }
 
-  // A first radiograph within a second, then all of it.
+  // Shows a first radiograph within a second, then the final one.
   async radiograph(whatIf) {
     const exposing = new AbortController();
     this.exposing = exposing;
@@ -271,12 +271,12 @@ export class WhatIfPanel {
     if (before) URL.revokeObjectURL(before);
   }
 
-  // A request that a later one replaced is no failure.
+  // A request replaced by a later one is not a failure.
   failed(error) {
     if (!isReplaced(error)) this.actions.fail(error);
   }
 
-  // All angles from 0 to 90 degrees, each as soon as the one before is shown.
+  // Shows all angles from 0 to 90 degrees, each as soon as the previous one is shown.
   async sweep() {
     this.sweeping = !this.sweeping;
     byId("sweep").textContent = this.sweeping ? "Stop" : "Play 0 to 90°";
@@ -296,7 +296,7 @@ export class WhatIfPanel {
     this.changed();
   }
 
-  // Saves the plan or the cameras as they are shown.
+  // Saves the displayed plan or cameras.
   async save(what, replace) {
     try {
       const response = await post(what, { what_if: this.whatIf(), replace });

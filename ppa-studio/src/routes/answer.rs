@@ -1,4 +1,4 @@
-//! Answers: JSON, bytes, or one sentence about what went wrong.
+//! Answers: JSON, bytes, or an error as one sentence.
 
 use std::sync::Arc;
 
@@ -11,23 +11,23 @@ use serde::Serialize;
 use crate::error::StudioError;
 use crate::state::State;
 
-/// Header with what is known of an image, JSON.
+/// Header with the JSON report of an image.
 pub(super) const REPORT: HeaderName = HeaderName::from_static("x-report");
 
-/// A sentence for the person at the page.
+/// An error message for the user of the page.
 #[derive(Serialize)]
 struct Sentence {
     error: String,
 }
 
-/// Does work that takes longer than a moment, outside the threads that serve requests.
+/// Does longer work outside the threads that serve requests.
 pub(super) async fn work<T: Send + 'static>(
     state: Arc<State>,
     work: impl FnOnce(&State) -> Result<T, StudioError> + Send + 'static,
 ) -> Result<T, Response> {
     match tokio::task::spawn_blocking(move || work(&state)).await {
         Ok(done) => done.map_err(failed),
-        // A panic is a bug; it must not take the page down.
+        // A panic is a bug, but must not end the page.
         Err(error) => Err(sentence(
             StatusCode::INTERNAL_SERVER_ERROR,
             format!("internal error: {error}"),
@@ -35,7 +35,7 @@ pub(super) async fn work<T: Send + 'static>(
     }
 }
 
-/// An error as an answer.
+/// Converts an error to an answer.
 pub(super) fn failed(error: StudioError) -> Response {
     let status = match error {
         StudioError::Superseded
@@ -51,7 +51,7 @@ pub(super) fn sentence(status: StatusCode, error: String) -> Response {
     (status, Json(Sentence { error })).into_response()
 }
 
-/// JSON with the escapes of all characters that a header may not hold.
+/// Escapes all characters of JSON that a header must not contain.
 fn ascii_json(json: &str) -> String {
     let mut ascii = String::new();
     for c in json.chars() {
@@ -67,12 +67,12 @@ fn ascii_json(json: &str) -> String {
     ascii
 }
 
-/// A PNG file.
+/// Answers with a PNG file.
 pub(super) fn png_file(png: Vec<u8>) -> Response {
     ([(CONTENT_TYPE, HeaderValue::from_static("image/png"))], png).into_response()
 }
 
-/// An image with its report.
+/// Answers with an image and its report.
 pub(super) fn picture(png: Vec<u8>, report: &impl Serialize) -> Response {
     let report = ascii_json(&serde_json::to_string(report).unwrap_or_default());
     let report = HeaderValue::from_str(&report).unwrap_or(HeaderValue::from_static("{}"));

@@ -1,4 +1,4 @@
-//! The dataset: its poses, findings and splits, images of a pose, and its limbs.
+//! The dataset: poses, findings, splits, images of a pose, and limbs.
 
 use std::sync::Arc;
 
@@ -23,14 +23,14 @@ use crate::generation::own_threads;
 use crate::png::png;
 use crate::state::State;
 
-/// What is open.
+/// The open files.
 #[derive(Serialize)]
 pub(super) struct Opened {
     limb: bool,
     plan: bool,
-    /// Name of the dataset that was opened, if it is one.
+    /// Name of the opened dataset, if any.
     dataset: Option<String>,
-    /// Folder whose frames are judged as they come, if there is one.
+    /// Folder of the watched frames, if any.
     watched: Option<String>,
 }
 
@@ -49,13 +49,13 @@ pub(super) async fn opened(Extracted(state): Extracted<Arc<State>>) -> Json<Open
     })
 }
 
-/// What the quality report draws, as numbers.
+/// Data of the quality report.
 #[derive(Serialize)]
 pub(super) struct Quality {
     poses: Vec<PoseRow>,
     findings: Vec<LimbFinding>,
     splits: Vec<SplitState>,
-    /// Limbs whose cases the plan names: they can be opened.
+    /// Limbs that can be opened because the plan names their cases.
     at_hand: Vec<LimbId>,
     commands: DatasetCommands,
 }
@@ -63,9 +63,9 @@ pub(super) struct Quality {
 #[derive(Serialize)]
 struct SplitState {
     name: String,
-    /// Parts with their persons.
+    /// Parts with their patients.
     parts: Vec<(String, Vec<u32>)>,
-    /// Why it cannot be used.
+    /// Why the split cannot be used.
     error: Option<String>,
 }
 
@@ -87,7 +87,7 @@ impl SplitState {
     }
 }
 
-/// What a dataset holds; nothing for one that the plan has yet to make.
+/// Answers with the quality report of a dataset, or `null` if the plan's dataset is not made yet.
 pub(super) async fn quality(
     Extracted(state): Extracted<Arc<State>>,
     Query(Dataset { folder }): Query<Dataset>,
@@ -117,7 +117,7 @@ pub(super) async fn quality(
     .await
 }
 
-/// Limbs of the plan whose cases can be read.
+/// Returns the limbs of the plan whose cases can be read.
 fn at_hand(state: &State) -> Vec<LimbId> {
     let plan = state.plan();
     let limbs = plan.cases.iter().filter_map(|planned| {
@@ -128,7 +128,7 @@ fn at_hand(state: &State) -> Vec<LimbId> {
     limbs.collect()
 }
 
-/// What is wrong with files of a dataset.
+/// Result of the check of a dataset's files.
 #[derive(Serialize)]
 pub(super) struct Checked {
     depth_images: usize,
@@ -136,7 +136,7 @@ pub(super) struct Checked {
     flaws: Vec<String>,
 }
 
-/// Decodes all images and compares them with the lists; of several requests the newest is answered.
+/// Decodes all images and compares them with the lists; of several requests, only the newest is answered.
 pub(super) async fn check(
     Extracted(state): Extracted<Arc<State>>,
     Json(Dataset { folder }): Json<Dataset>,
@@ -158,7 +158,7 @@ pub(super) async fn check(
     .await
 }
 
-/// Images of both cameras of a pose in false colour, PNG.
+/// Answers with a PNG of a pose's depth images of both cameras in false colour.
 pub(super) async fn depth(
     Extracted(state): Extracted<Arc<State>>,
     Path((patient, side, shape, step)): Path<(u32, Side, BodyShape, u32)>,
@@ -176,7 +176,7 @@ pub(super) async fn depth(
     Ok(png_file(png))
 }
 
-/// The radiograph of a pose, PNG.
+/// Answers with the radiograph of a pose, PNG.
 pub(super) async fn radiograph(
     Extracted(state): Extracted<Arc<State>>,
     Path((patient, side, step)): Path<(u32, Side, u32)>,

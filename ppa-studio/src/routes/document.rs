@@ -1,4 +1,4 @@
-//! The limb with its landmarks: state, changes, undo, saving.
+//! The limb with its landmarks: state, changes, undo and saving.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -20,31 +20,31 @@ use crate::error::StudioError;
 use crate::state::State;
 use crate::what_if::WhatIf;
 
-/// All that the page shows of the limb, but for images.
+/// Everything that the page shows of the limb except images.
 #[derive(Serialize)]
 pub(super) struct Document {
     revision: u64,
-    /// The opened file, without its folder.
+    /// Name of the opened file, without its folder.
     name: String,
     side: Side,
     limb: LimbKind,
-    /// Why landmarks have to be set by hand, if they were not found.
+    /// Why landmarks must be set by hand, or `None` if they were found.
     note: Option<String>,
     grid: GridState,
     iso_hu: f64,
-    /// A point that was chosen to be inside the limb.
+    /// Point chosen inside the limb.
     inside: Option<[f64; 3]>,
-    /// The part of the scan that is used, if not all.
+    /// Part of the scan that is used, if not all.
     crop: Option<VoxelBox>,
     /// Balls of the scan that are cut off.
     removed: Vec<Ball>,
-    /// The highest HU that the surface may have.
+    /// Maximum HU of the surface.
     core_hu: f64,
     choices: LandmarkOverrides,
     landmarks: Landmarks,
-    /// What is found where nobody chooses.
+    /// Landmarks found without manual choices.
     automatic: Option<Landmarks>,
-    /// Front of the mortise, `ct` frame, where it is known.
+    /// Front of the mortise, `ct` frame, if known.
     mortise: Option<[f64; 3]>,
     findings: Vec<Finding>,
     acknowledged: Vec<FindingCode>,
@@ -56,7 +56,7 @@ pub(super) struct Document {
     planned: Planned,
 }
 
-/// What the plan says where no slider is moved.
+/// Values of the plan, for sliders that have not been moved.
 #[derive(Serialize)]
 struct Planned {
     distal_mm: f64,
@@ -82,7 +82,7 @@ struct Files {
     original: String,
     edited: String,
     has_edits: bool,
-    /// Whether the original is there: a scan that was opened has no case yet.
+    /// Whether the original exists: an opened scan may have no case yet.
     is_saved: bool,
     plan: Option<String>,
     saved_plan: String,
@@ -94,7 +94,7 @@ pub(super) async fn state(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| document(state).map(Json)).await
 }
 
-/// Landmarks to choose; keys that are left out are found.
+/// Sets the landmark choices; landmarks of absent keys are found automatically.
 pub(super) async fn choices(
     Extracted(state): Extracted<Arc<State>>,
     Json(choices): Json<LandmarkOverrides>,
@@ -102,7 +102,7 @@ pub(super) async fn choices(
     edit(state, move |case| Case { choices, ..case }).await
 }
 
-/// How the skin is found.
+/// Changes of the settings that find the skin.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SurfaceChange {
@@ -111,14 +111,14 @@ pub(super) struct SurfaceChange {
     /// A point in the wanted limb, or `null` for the automatic choice.
     #[serde(default, with = "double_option")]
     inside: Option<Option<[f64; 3]>>,
-    /// The part of the scan to look at, or `null` for all of it.
+    /// Part of the scan to use, or `null` for all of it.
     #[serde(default, with = "double_option")]
     crop: Option<Option<VoxelBox>>,
     /// Balls to cut off.
     removed: Option<Vec<Ball>>,
 }
 
-/// Tells an absent key from `null`.
+/// Distinguishes an absent key from `null`.
 mod double_option {
     use serde::{Deserialize, Deserializer};
 
@@ -136,7 +136,7 @@ pub(super) async fn surface(
     edit(state, move |mut case| {
         case.surface.iso_hu = change.iso_hu.unwrap_or(case.surface.iso_hu);
         if let Some(inside) = change.inside {
-            // Bodies were kept as parts of the limb that was taken before.
+            // Bodies were kept as parts of the previous limb.
             case.surface.inside = inside;
             case.surface.kept.clear();
         }
@@ -155,7 +155,7 @@ pub(super) struct InBody {
     point: [f64; 3],
 }
 
-/// Keeps a body as a part of the limb, or removes it.
+/// Keeps a body as part of the limb, or removes it.
 pub(super) async fn body(
     Extracted(state): Extracted<Arc<State>>,
     Json(InBody { point }): Json<InBody>,
@@ -194,7 +194,7 @@ pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
     .await
 }
 
-/// Writes the case over the one that was opened.
+/// Overwrites the opened case.
 pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
         let limb = state.limb()?;
@@ -205,12 +205,12 @@ pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     .await
 }
 
-/// A plan or its cameras, to save.
+/// Request to save a plan or its cameras.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ToSave {
     what_if: WhatIf,
-    /// Whether the person agreed to replace the file that is there.
+    /// Whether the user agreed to replace an existing file.
     #[serde(default)]
     replace: bool,
 }
@@ -243,7 +243,7 @@ pub(super) async fn plan(
     .await
 }
 
-/// Saves the cameras as they are moved, as a rig that plans and commands read.
+/// Saves the moved cameras as a rig that plans and commands can read.
 pub(super) async fn cameras(
     Extracted(state): Extracted<Arc<State>>,
     Json(ToSave { what_if, replace }): Json<ToSave>,
@@ -273,7 +273,7 @@ async fn edit(state: Arc<State>, change: impl FnOnce(Case) -> Case + Send + 'sta
     .await
 }
 
-/// All that the page shows of the limb.
+/// Returns everything that the page shows of the limb except images.
 pub(super) fn document(state: &State) -> Result<Document, StudioError> {
     let limb = state.limb()?;
     let [can_undo, can_redo] = limb.desk().can_step();

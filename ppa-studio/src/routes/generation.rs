@@ -20,10 +20,10 @@ use crate::shards::ShardState;
 use crate::state::State;
 use crate::stoppable::StopOnDrop;
 
-/// Most poses of a contact sheet.
+/// Maximum number of poses on a contact sheet.
 const COLUMNS: usize = 8;
 
-/// A dataset beside the plan.
+/// A dataset next to the plan.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Dataset {
@@ -36,13 +36,13 @@ pub(super) struct Estimate {
     #[serde(flatten)]
     forecast: Forecast,
     threads: usize,
-    /// On threads that have a core each.
+    /// Wall time if each thread has its own core.
     wall_hours: f64,
-    /// Why the images do not fit on the disk.
+    /// Why the images do not fit on the disk, if so.
     no_room: Option<String>,
 }
 
-/// What the dataset takes, by one pose of every limb; of several requests the newest is answered.
+/// Forecasts the cost of the dataset from one pose of each limb; of several requests, only the newest is answered.
 pub(super) async fn forecast(
     Extracted(state): Extracted<Arc<State>>,
     Json(Dataset { folder }): Json<Dataset>,
@@ -84,7 +84,7 @@ pub(super) async fn state(
     work(state, move |state| generated(state, &folder)).await
 }
 
-/// Makes what is missing.
+/// Starts to make the missing part of the dataset.
 pub(super) async fn start(
     Extracted(state): Extracted<Arc<State>>,
     Json(Dataset { folder }): Json<Dataset>,
@@ -98,7 +98,7 @@ pub(super) async fn start(
     .await
 }
 
-/// Ends the run after the poses under way.
+/// Ends the run after the current poses.
 pub(super) async fn pause(
     Extracted(state): Extracted<Arc<State>>,
     Json(Dataset { folder }): Json<Dataset>,
@@ -120,7 +120,7 @@ fn generated(state: &State, folder: &str) -> Result<Json<Generated>, crate::erro
     }))
 }
 
-/// The shards that other machines make.
+/// Answers with the shards made by other machines.
 pub(super) async fn shards(
     Extracted(state): Extracted<Arc<State>>,
     Query(Dataset { folder }): Query<Dataset>,
@@ -132,7 +132,7 @@ pub(super) async fn shards(
     .await
 }
 
-/// Poses of a limb that are made so far, PNG.
+/// Answers with a contact sheet of a limb's poses so far, PNG.
 pub(super) async fn contact_sheet(
     Extracted(state): Extracted<Arc<State>>,
     Path((patient, side)): Path<(u32, Side)>,

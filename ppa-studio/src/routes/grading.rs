@@ -1,4 +1,4 @@
-//! Grading by readers: the pictures of a key one by one, and a reader's grades.
+//! Grading by readers: the pictures of a key, one at a time, and a reader's grades.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use crate::commands::{GradingCommands, of_grading};
 use crate::error::StudioError;
 use crate::state::{State, named_folder};
 
-/// A dataset, and the folder for readers beside it.
+/// A dataset and the folder for readers next to it.
 #[derive(Deserialize)]
 pub(super) struct Place {
     /// Name of the dataset's folder.
@@ -33,7 +33,7 @@ impl Place {
         state.dataset(&self.folder)
     }
 
-    /// The images of the dataset.
+    /// Reads the list of the dataset's images.
     fn manifest(&self, state: &State) -> Result<Manifest, StudioError> {
         let root = self.root(state)?;
         if !root.join(Manifest::FILE).exists() {
@@ -42,7 +42,7 @@ impl Place {
         Ok(Manifest::read(&root)?)
     }
 
-    /// The folder for readers.
+    /// Returns the folder for readers.
     fn sheets(&self, state: &State) -> Result<PathBuf, StudioError> {
         let root = self.root(state)?;
         let beside = root.parent().unwrap_or(&root);
@@ -66,30 +66,30 @@ impl Place {
     }
 }
 
-/// Who grades what.
+/// Request to begin or continue a reader's grading.
 #[derive(Deserialize)]
 pub(super) struct Begin {
     #[serde(flatten)]
     place: Place,
     reader: String,
-    /// Of a key that is made now: poses at multiples of this angle, and the seed of names and order.
+    /// For a new key: poses at multiples of this angle. `seed` is that of names and order.
     every_deg: f64,
     seed: u64,
 }
 
-/// What a reader grades: names alone, which mean nothing.
+/// The pictures to grade, under meaningless names, and the grades so far.
 #[derive(Serialize)]
 pub(super) struct Grading {
     pictures: Vec<String>,
     grades: BTreeMap<String, f64>,
     /// The file of the grades.
     file: PathBuf,
-    /// Whether the key was there already.
+    /// Whether the key existed already.
     key_found: bool,
     commands: GradingCommands,
 }
 
-/// Opens the key of a folder for readers, or makes one, and the grades of a reader.
+/// Opens or makes the key of a folder for readers, and opens the grades of a reader.
 pub(super) async fn begin(
     Extracted(state): Extracted<Arc<State>>,
     Json(begin): Json<Begin>,
@@ -134,7 +134,7 @@ pub(super) async fn begin(
     .await
 }
 
-/// The picture of a name, PNG.
+/// Answers with the picture of a name, PNG.
 pub(super) async fn picture(
     Extracted(state): Extracted<Arc<State>>,
     Path(name): Path<String>,
@@ -176,7 +176,7 @@ pub(super) async fn grade(
     .await
 }
 
-/// Makes labels of the grades of all readers in the folder.
+/// Makes labels from the grades of all readers in the folder.
 pub(super) async fn import(
     Extracted(state): Extracted<Arc<State>>,
     Json(place): Json<Place>,

@@ -15,7 +15,7 @@ use crate::scene::Pass;
 use crate::state::State;
 use crate::what_if::WhatIf;
 
-/// Both depth images; of several requests only the newest is answered.
+/// Renders both depth images; of several requests, only the newest is answered.
 pub(super) async fn depth(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,
@@ -25,7 +25,7 @@ pub(super) async fn depth(
         let _turn = state.depth.turn(&ticket)?;
         let limb = state.limb()?;
         let network = state.network.as_ref();
-        // Bumps differ between persons.
+        // Bumps differ between patients.
         let patient = match what_if.shape {
             Some(_) => state.patient()?,
             None => 0,
@@ -36,7 +36,7 @@ pub(super) async fn depth(
     Ok(picture(made.png, &made.report))
 }
 
-/// A radiograph, `first` with larger pixels or `final`; ends when another is asked for or nobody waits any more.
+/// Computes a radiograph, `first` with larger pixels or `final`, until a newer request arrives or nobody waits any more.
 pub(super) async fn radiograph(
     Extracted(state): Extracted<Arc<State>>,
     Path(pass): Path<String>,
@@ -62,7 +62,7 @@ pub(super) async fn radiograph(
     Ok(picture(made.png, &made.report))
 }
 
-/// Absorbed dose; ends when a radiograph is asked for or nobody waits any more.
+/// Computes the absorbed dose, until a newer request for a dose or a radiograph arrives or nobody waits any more.
 pub(super) async fn dose(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,
@@ -79,7 +79,7 @@ pub(super) async fn dose(
     .await
 }
 
-/// The commands that make these images.
+/// Answers with the commands that make these images.
 pub(super) async fn commands(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,

@@ -1,4 +1,4 @@
-//! The newest pair of frames, judged.
+//! The newest pair of frames with its prediction.
 
 use std::sync::Arc;
 
@@ -11,16 +11,16 @@ use super::answer::{picture, work};
 use crate::live::LiveReport;
 use crate::state::State;
 
-/// What is known of a pair.
+/// Report on a pair.
 #[derive(Serialize)]
 struct Aged<'a> {
     #[serde(flatten)]
     report: &'a LiveReport,
-    /// How old its frames are, seconds.
+    /// Age of its frames, seconds.
     age_s: f64,
 }
 
-/// The newest pair whose number is above `after` as a picture with its report; no content until there is one.
+/// Answers with the picture and report of the newest pair if its number is above `after`, otherwise with no content.
 pub(super) async fn newest(
     Extracted(state): Extracted<Arc<State>>,
     Path(after): Path<u64>,

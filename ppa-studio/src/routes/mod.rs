@@ -1,4 +1,4 @@
-//! What the page asks for, and the answers.
+//! Requests of the page and their answers.
 
 mod answer;
 mod dataset;
@@ -23,7 +23,7 @@ use crate::guard::guard;
 use crate::page;
 use crate::state::State;
 
-/// Largest body of a request, bytes: the longest is a set of landmarks.
+/// Maximum size of a request body, bytes: the longest is a set of landmarks.
 const MAX_BODY: usize = 64 * 1024;
 
 pub(crate) fn router(state: Arc<State>) -> Router {

@@ -1,4 +1,4 @@
-//! The plan: its form, changes, and saving.
+//! The plan: its form, changes and saving.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -23,20 +23,20 @@ use crate::state::State;
 #[derive(Serialize)]
 pub(super) struct PlanForm {
     original: String,
-    /// The file that holds the plan as it is shown.
+    /// File that holds the displayed plan.
     current: String,
     has_edits: bool,
-    /// Whether the original is there: a case that was opened may have no plan yet.
+    /// Whether the original exists: an opened case may have no plan yet.
     is_saved: bool,
-    /// Name of the folder that `ppa generate` makes of the original.
+    /// Name of the folder that `ppa generate` makes from the original.
     dataset: String,
     limbs: Vec<Limb>,
-    /// Cases in the folder of the plan that it does not name.
+    /// Cases in the plan's folder that the plan does not name.
     other_cases: BTreeSet<String>,
     can_undo: bool,
     can_redo: bool,
     fields: Vec<Field>,
-    /// The table of materials in use.
+    /// Table of materials in use.
     materials: Vec<Material>,
 }
 
@@ -44,9 +44,9 @@ pub(super) struct PlanForm {
 #[derive(Serialize)]
 struct Material {
     segment: String,
-    /// Lowest HU; none of the first segment.
+    /// Lowest HU; `None` for the first segment.
     from_hu: Option<f32>,
-    /// One material, or two that are mixed.
+    /// One material, or two for a mixture.
     materials: Vec<String>,
     /// Knots of the density, HU and g/cm³.
     density: Vec<[f32; 2]>,
@@ -56,10 +56,10 @@ struct Material {
 #[derive(Serialize)]
 struct Limb {
     patient: u32,
-    /// The file of its case, without the folder.
+    /// Name of its case file, without the folder.
     case: String,
     uses_edits: bool,
-    /// Whether there is a file of each kind, to choose from.
+    /// Whether the other case file, edited or original, exists.
     has_edits: bool,
 }
 
@@ -69,12 +69,12 @@ pub(super) async fn form(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| plan_form(state).map(Json)).await
 }
 
-/// Another value of a key.
+/// Change of a key's value.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KeyChange {
     key: String,
-    /// What was typed; `null` leaves the key out, so that its default holds.
+    /// Typed value; `null` removes the key, so that its default applies.
     value: Option<String>,
 }
 
@@ -96,7 +96,7 @@ pub(super) struct LimitsOf {
     key: String,
 }
 
-/// Which numbers the plan accepts for a key.
+/// Answers with the range of numbers that the plan accepts for a key.
 pub(super) async fn limits(
     Extracted(state): Extracted<Arc<State>>,
     Json(LimitsOf { key }): Json<LimitsOf>,
@@ -139,7 +139,7 @@ pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
     .await
 }
 
-/// Writes the plan over the one that was opened.
+/// Overwrites the opened plan.
 pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
         let mut file = state.plan_file();

@@ -1,4 +1,4 @@
-//! Where everything stands in the room.
+//! Poses of all objects in the room.
 
 use std::sync::Arc;
 
@@ -28,9 +28,9 @@ pub(super) struct Room {
     contact: Contact,
     /// The focal spot.
     source: Point3<f64>,
-    /// Corners of the detector, in turn.
+    /// Corners of the detector, in circular order.
     detector: [Point3<f64>; 4],
-    /// Where the central beam meets the table.
+    /// Point where the central beam meets the table.
     table_centre: Point3<f64>,
     table_size_mm: [f64; 2],
     cameras: Vec<CameraState>,
@@ -41,11 +41,11 @@ struct CameraState {
     view: View,
     room_from_camera: TransformRows,
     centre: Point3<f64>,
-    /// Points that the corners of the image see at a depth of 1 m, in turn.
+    /// Points seen by the corners of the image at a depth of 1 m, in circular order.
     corners: Vec<Point3<f64>>,
 }
 
-/// The computed label of the pose; `null` where the case names no bones.
+/// Answers with the computed label of the pose; `null` if the case names no bones.
 pub(super) async fn label(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,
@@ -69,7 +69,7 @@ pub(super) async fn label(
     .await
 }
 
-/// What both cameras see of the skin near the joint; of several requests the newest is answered.
+/// Answers with both cameras' coverage of the skin near the joint; of several requests, only the newest is answered.
 pub(super) async fn coverage(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,
@@ -90,7 +90,7 @@ pub(super) async fn coverage(
     .await
 }
 
-/// Where the limb lies.
+/// Places the limb on the table.
 fn place(
     setup: &SceneSetup,
     shown: &Shown,

@@ -15,7 +15,8 @@ use crate::display_mesh::{self, display_mesh};
 use crate::error::StudioError;
 use crate::state::State;
 
-/// A slice across a voxel axis: HU as little-endian i16, then one byte a voxel, 1 inside the limb; rows along the later axis.
+/// Answers with a slice across a voxel axis: HU as little-endian i16, then one byte per voxel, 1 inside the limb. The row
+/// number increases along the later axis.
 pub(super) async fn slice(
     Extracted(state): Extracted<Arc<State>>,
     Path((axis, index)): Path<(usize, usize)>,
@@ -49,7 +50,7 @@ fn plane(limb: &PreparedLimb, axis: usize, index: usize) -> Result<Vec<u8>, Stud
         voxel
     });
     let voxels: Vec<[usize; 3]> = voxels.collect();
-    // Saturates: displays show no HU beyond 16 bits.
+    // Saturates at 16 bits, which is enough for display.
     let hu = voxels
         .iter()
         .map(|&voxel| limb.volume.at(voxel).round() as i16);
@@ -61,7 +62,7 @@ fn plane(limb: &PreparedLimb, axis: usize, index: usize) -> Result<Vec<u8>, Stud
     Ok(plane)
 }
 
-/// The skin with fewer triangles, for display.
+/// Answers with the skin, simplified for display.
 pub(super) async fn skin(Extracted(state): Extracted<Arc<State>>) -> Result<Response, Response> {
     work(state, |state| {
         let shown = state.limb()?.shown();
@@ -72,7 +73,7 @@ pub(super) async fn skin(Extracted(state): Extracted<Arc<State>>) -> Result<Resp
     .map(bytes)
 }
 
-/// What was removed beside the limb and inside it, as a coarse surface, to be seen with the skin.
+/// Answers with the coarse surface of the parts removed outside and inside the limb, shown with the skin.
 pub(super) async fn removed(Extracted(state): Extracted<Arc<State>>) -> Result<Response, Response> {
     work(state, |state| {
         let limb = state.limb()?;
@@ -92,7 +93,7 @@ pub(super) struct ShapeOf {
     shape: BodyShape,
 }
 
-/// The skin in a body shape of the plan's dataset, for display, with how far each vertex lies outside the skin of the scan, mm.
+/// Answers with the skin in a body shape of the plan's dataset, for display, and the outward displacement of each vertex, mm.
 pub(super) async fn body_shape(
     Extracted(state): Extracted<Arc<State>>,
     Json(ShapeOf { shape }): Json<ShapeOf>,
@@ -117,14 +118,14 @@ pub(super) async fn body_shape(
     .map(bytes)
 }
 
-/// A HU.
+/// HU of a surface.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SurfaceAt {
     iso_hu: f32,
 }
 
-/// The surface of everything in the scan at a HU, coarse, to be seen while a slider moves.
+/// Answers with the coarse surface of everything in the scan at a HU, shown while a slider moves.
 pub(super) async fn surface_at(
     Extracted(state): Extracted<Arc<State>>,
     Json(SurfaceAt { iso_hu }): Json<SurfaceAt>,

@@ -1,4 +1,4 @@
-//! Trainings: their progress, their curves, their errors and the images with the largest.
+//! Training runs: progress, curves, errors, and the images with the largest errors.
 
 use std::sync::Arc;
 
@@ -20,17 +20,17 @@ use crate::state::State;
 use crate::training_errors::Errors;
 use crate::trainings::TrainingState;
 
-/// The trainings that there are.
+/// The training runs found.
 #[derive(Serialize)]
 pub(super) struct List {
-    /// Folder that was searched.
+    /// Searched folder.
     folder: String,
     trainings: Vec<TrainingState>,
-    /// The command that judges the watched frames, if there are any.
+    /// Command that predicts from the watched frames, if any.
     watch: Option<String>,
 }
 
-/// A training by its name in the list.
+/// Name of a training run in the list.
 #[derive(Deserialize)]
 pub(super) struct Named {
     run: String,
@@ -55,7 +55,7 @@ pub(super) async fn log(
     work(state, move |state| state.trainings.log(&run).map(Json)).await
 }
 
-/// Predicts the evaluation images; of several requests the newest is answered, and none whose sender is gone.
+/// Predicts the evaluation images; of several requests, only the newest is answered, if its sender still waits.
 pub(super) async fn errors(
     Extracted(state): Extracted<Arc<State>>,
     Json(Named { run }): Json<Named>,
@@ -72,7 +72,7 @@ pub(super) async fn errors(
     .await
 }
 
-/// An image with one of the largest errors in false colour, PNG.
+/// Answers with an image with one of the largest errors in false colour, PNG.
 pub(super) async fn image(
     Extracted(state): Extracted<Arc<State>>,
     Path(number): Path<usize>,

@@ -1,4 +1,4 @@
-//! A phantom that is open in a studio, and requests as the page sends them.
+//! A phantom opened in a studio, and requests as sent by the page.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -16,10 +16,10 @@ use ppa_studio::{Opening, Studio};
 use tempfile::TempDir;
 use tower::ServiceExt;
 
-/// Host of all requests that are not about hosts.
+/// Default host of requests.
 pub const HOST: &str = "127.0.0.1:8123";
 
-/// An open phantom with the cookie of a browser.
+/// An opened phantom with the cookie of a browser.
 pub struct Browser {
     pub folder: TempDir,
     pub case: PathBuf,
@@ -28,7 +28,7 @@ pub struct Browser {
     runtime: tokio::runtime::Runtime,
 }
 
-/// An answer, read to its end.
+/// A complete answer.
 pub struct Answer {
     pub status: StatusCode,
     pub headers: axum::http::HeaderMap,
@@ -46,21 +46,21 @@ impl Answer {
     }
 }
 
-/// The case of P01 in a folder, in voxels for most tests.
+/// Writes P01 and its case into a folder, with voxels for most tests.
 pub fn phantom(folder: &Path) -> PathBuf {
     static MADE: LazyLock<TempDir> = LazyLock::new(|| made(2.0)); // the coarsest in which the ankle is recognised
     copy(MADE.path(), folder);
     folder.join("p01.case.toml")
 }
 
-/// The case of P01 in a folder, in voxels fine enough for the gutters of the ankle.
+/// Writes P01 and its case into a folder, with voxels fine enough for the gutters of the ankle.
 pub fn fine_phantom(folder: &Path) -> PathBuf {
     static MADE: LazyLock<TempDir> = LazyLock::new(|| made(1.25));
     copy(MADE.path(), folder);
     folder.join("p01.case.toml")
 }
 
-/// Copies what a folder holds into another one.
+/// Copies the contents of a folder into another one.
 pub fn copy(from: &Path, to: &Path) {
     for entry in std::fs::read_dir(from).unwrap() {
         let path = entry.unwrap().path();
@@ -74,7 +74,7 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A folder with P01, its bones and its case, which names them relative to itself.
+/// Makes a folder with P01, its bones and its case, which names them by relative paths.
 fn made(spacing_mm: f64) -> TempDir {
     let made = tempfile::tempdir().unwrap();
     let folder = made.path();
@@ -109,12 +109,12 @@ impl Browser {
         Self::opened(folder, &Opening::of(&case))
     }
 
-    /// A case with what else is to be opened.
+    /// Opens a case with further options.
     pub fn opened(folder: TempDir, opening: &Opening) -> Self {
         let case = opening.path.clone().unwrap_or_default();
         let studio = Studio::open(opening).unwrap();
         let router = studio.router();
-        // One thread, so that requests begin in the order in which they are sent.
+        // One thread, so that requests begin in the order of sending.
         let mut runtime = tokio::runtime::Builder::new_current_thread();
         let runtime = runtime.enable_all().build().unwrap();
         let address = studio.address(HOST.parse().unwrap());
@@ -157,7 +157,7 @@ impl Browser {
             .block_on(async { read(self.router.clone().oneshot(request).await.unwrap()).await })
     }
 
-    /// All requests at once, in this order.
+    /// Sends all requests at once, in this order.
     pub fn send_all(&self, requests: Vec<Request<Body>>) -> Vec<Answer> {
         self.runtime.block_on(async {
             let mut answers = Vec::new();
@@ -167,7 +167,7 @@ impl Browser {
                 waiting.spawn(async move {
                     (number, read(router.oneshot(request).await.unwrap()).await)
                 });
-                // Each begins before the next one comes.
+                // Each request begins before the next one is sent.
                 tokio::task::yield_now().await;
             }
             while let Some(done) = waiting.join_next().await {

@@ -10,7 +10,7 @@ use crate::browser::Browser;
 /// The left camera 100 mm nearer to the patient's feet, the right one 30 mm farther down the beam.
 const SHIFTS: [[f64; 3]; 2] = [[0.0, 100.0, 0.0], [0.0, 0.0, 30.0]];
 
-/// The rig of the plan with these shifts.
+/// Returns the rig of the plan with these shifts.
 fn moved() -> RigSpec {
     let mut rig = RigSpec::default();
     for (camera, shift) in [&mut rig.left, &mut rig.right].into_iter().zip(SHIFTS) {
@@ -38,7 +38,7 @@ fn differences(a: &RigSpec, b: &RigSpec) -> f64 {
 #[test]
 fn moved_cameras_see_what_the_library_renders_from_there() {
     let browser = Browser::new();
-    // First from the plan's places, so that the room is kept.
+    // First with the cameras of the plan, so that the room is cached.
     browser.post("/api/depth", &json!({ "angle_deg": 18.0 }));
     let answer = browser.post("/api/depth", &what_if());
     let shown = image::load_from_memory(&answer.body).unwrap().to_rgb8();

@@ -1,4 +1,4 @@
-//! Chromium with the page of a phantom, driven as a person would.
+//! Chromium with the page of a phantom, driven like a user.
 
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -18,21 +18,21 @@ use tempfile::TempDir;
 
 use crate::browser::fine_phantom;
 
-/// How long anything on the page may take.
+/// Timeout of anything on the page.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Drives a browser.
+/// Runs a browser test.
 pub fn run(test: impl Future<Output = ()>) {
     let mut runtime = tokio::runtime::Builder::new_multi_thread();
     runtime.enable_all().build().unwrap().block_on(test);
 }
 
-/// A served phantom and the browser that shows it.
+/// A served phantom and a browser that shows it.
 pub struct Page {
     pub client: Client,
     pub folder: TempDir,
     opening: Opening,
-    /// Folder of the address of the program, and so of the next one.
+    /// Folder that stores the address for a restart.
     last: TempDir,
     served: Served,
     driver: Driver,
@@ -44,7 +44,7 @@ struct Served {
 }
 
 impl Served {
-    /// Serves the page, where it was served before if it can be; returns the address too.
+    /// Serves the page, at the previous address if possible; also returns the address.
     fn begin(opening: &Opening, last: &Path) -> (Self, String) {
         let last = last.join("private/last.json");
         let endpoint = Endpoint::open(([127, 0, 0, 1], 0).into(), Some(&last)).unwrap();
@@ -90,7 +90,7 @@ impl Page {
         Self::of(folder, &case).await
     }
 
-    /// A scan, case, plan or dataset in a folder.
+    /// Opens a scan, case, plan or dataset in a folder.
     pub async fn of(folder: TempDir, path: &Path) -> Self {
         Self::opened(folder, &Opening::of(path)).await
     }
@@ -99,7 +99,7 @@ impl Page {
         Self::drawn_by(&WEBGL, folder, opening).await
     }
 
-    /// In a browser that has no WebGL.
+    /// Opens the phantom in a browser without WebGL.
     pub async fn without_webgl() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let case = fine_phantom(folder.path());
@@ -124,7 +124,7 @@ impl Page {
         page
     }
 
-    /// Waits until an expression of the page is true.
+    /// Waits until an expression in the page is true.
     pub async fn wait(&self, expression: &str) {
         let started = Instant::now();
         while self.value(expression).await != json!(true) {
@@ -162,7 +162,7 @@ impl Page {
             .unwrap();
     }
 
-    /// Types into a field in place of what it holds, and leaves it.
+    /// Replaces the content of a field by typing, and leaves the field.
     pub async fn fill(&self, selector: &str, text: &str) {
         let field = self.client.find(Locator::Css(selector)).await.unwrap();
         field.click().await.unwrap();
@@ -173,13 +173,13 @@ impl Page {
             .unwrap();
     }
 
-    /// Presses a key where the keyboard is.
+    /// Presses a key at the focused element.
     pub async fn press(&self, key: &str) {
         let focused = self.client.active_element().await.unwrap();
         focused.send_keys(key).await.unwrap();
     }
 
-    /// Moves a slider, as dragging does.
+    /// Moves a slider as by dragging.
     pub async fn slide(&self, id: &str, value: f64) {
         self.set(id, json!(value)).await;
     }
@@ -200,7 +200,7 @@ impl Page {
             .unwrap();
     }
 
-    /// Saves what is seen, in the folder `PPA_PAGE_PICTURES` if it is set.
+    /// Saves a screenshot in the folder `PPA_PAGE_PICTURES`, if set.
     pub async fn picture(&self, name: &str) {
         if let Some(folder) = std::env::var_os("PPA_PAGE_PICTURES") {
             let png = self.client.screenshot().await.unwrap();
@@ -218,7 +218,7 @@ impl Page {
         self.served = Served::begin(&self.opening, self.last.path()).0;
     }
 
-    /// A rectangle of the page as it is seen: left, top, width and height in the page, and its pixels.
+    /// Captures an element of the page: left, top, width and height in the page, and its pixels.
     pub async fn seen(&self, selector: &str) -> ([u32; 4], RgbImage) {
         let script = "const r = document.querySelector(arguments[0]).getBoundingClientRect(); \
                       return [r.x, r.y, r.width, r.height].map(Math.floor);";
@@ -230,7 +230,7 @@ impl Page {
         (place, page.crop_imm(x, y, width, height).to_rgb8())
     }
 
-    /// Drags with the mouse from one place of the page to another.
+    /// Drags with the mouse between two places of the page.
     pub async fn drag(&self, from: [f64; 2], to: [f64; 2]) {
         let button = MOUSE_BUTTON_LEFT;
         let at = |share: f64| PointerAction::MoveTo {
@@ -247,12 +247,12 @@ impl Page {
         self.client.perform_actions(mouse).await.unwrap();
     }
 
-    /// Ends the browser; nothing may have gone wrong in its console.
+    /// Ends the browser; its console must have no unexpected errors.
     pub async fn close(self) {
         let log = self.client.issue_cmd(ConsoleLog).await.unwrap();
         let severe: Vec<&Value> = (log.as_array().unwrap().iter())
             .filter(|entry| entry["level"] == "SEVERE")
-            // Answers that a later request replaced, and values that a field refused, are expected.
+            // Superseded requests and values refused at a field are expected.
             .filter(|entry| {
                 let message = entry["message"].as_str().unwrap_or_default();
                 !(message.contains("409")
@@ -266,7 +266,7 @@ impl Page {
     }
 }
 
-/// WebGL 2 on the processor.
+/// Options for WebGL 2 on the CPU.
 const WEBGL: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
 async fn browser(graphics: &[&str]) -> (Driver, Client) {
@@ -300,7 +300,7 @@ async fn browser(graphics: &[&str]) -> (Driver, Client) {
     }
 }
 
-/// Chromium's own command for the messages of the console.
+/// Chromium's own command for the console messages.
 #[derive(Debug)]
 struct ConsoleLog;
 

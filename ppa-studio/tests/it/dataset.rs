@@ -1,4 +1,4 @@
-//! A dataset that is opened: its poses, their images, and its limbs.
+//! An opened dataset: its poses, their images, and its limbs.
 
 use axum::http::StatusCode;
 use image::GenericImageView;
@@ -53,7 +53,7 @@ fn poses_and_outliers_are_those_of_the_quality_report() {
         .post("/api/dataset/check", &json!({ "folder": "ankles" }))
         .json();
     assert_eq!(checked["depth_images"], 22);
-    // The list that was altered.
+    // The altered list.
     assert!(
         checked["flaws"].to_string().contains("manifest.jsonl"),
         "{checked}"
@@ -108,7 +108,7 @@ fn a_limb_is_opened_where_the_plan_names_its_case() {
     let document = browser.post("/api/dataset/open", &json!(LIMB)).json();
     assert_eq!(document["name"], "p01.case.toml");
     assert_eq!(browser.get("/api/opened").json()["limb"], true);
-    // Its decisions are changed as those of a case that was opened.
+    // Its decisions can be changed like those of an opened case.
     let joint = document["landmarks"]["joint_centre"].clone();
     browser
         .post("/api/choices", &json!({ "joint_centre": joint }))
@@ -133,7 +133,7 @@ fn a_dataset_without_its_plan_shows_its_poses_alone() {
         browser.get("/api/plan/form").status,
         StatusCode::UNPROCESSABLE_ENTITY
     );
-    // A dataset that is not finished has no list of images.
+    // An unfinished dataset has no list of images.
     std::fs::remove_file(browser.case.join(Manifest::FILE)).unwrap();
     let answer = browser.get("/api/dataset?folder=ankles");
     assert!(

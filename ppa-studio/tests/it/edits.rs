@@ -1,4 +1,4 @@
-//! Landmarks that a person changes, and the files that hold them.
+//! Landmarks changed by a user, and the files that hold them.
 
 use axum::http::StatusCode;
 use ppa_generate::{Case, Plan, PreparedLimb};
@@ -23,7 +23,7 @@ fn a_choice_is_saved_beside_the_case_with_its_comments() {
     assert_eq!(state["choices"]["joint_centre"], json!(joint));
     assert_eq!(state["can_undo"], true);
 
-    // The commands find what the page shows.
+    // The commands find the same as the page shows.
     assert_eq!(std::fs::read_to_string(&browser.case).unwrap(), commented);
     let edited = browser.folder.path().join("p01.edited.case.toml");
     let text = std::fs::read_to_string(&edited).unwrap();
@@ -39,7 +39,7 @@ fn a_choice_is_saved_beside_the_case_with_its_comments() {
     let state = browser.post("/api/redo", &json!({})).json();
     assert_eq!(state["choices"]["joint_centre"], json!(joint));
 
-    // Saved over the original on request alone.
+    // The original is overwritten on request only.
     let state = browser.post("/api/save", &json!({})).json();
     assert_eq!(state["files"]["has_edits"], false);
     assert!(!edited.exists());
@@ -91,7 +91,7 @@ fn a_file_that_another_program_changed_is_kept() {
         refused.text()
     );
     assert_eq!(std::fs::read_to_string(&edited).unwrap(), "somebody else's");
-    // What is not saved is not shown as if it were.
+    // Changes that were not saved are not shown.
     assert_eq!(decisions(), before);
 }
 

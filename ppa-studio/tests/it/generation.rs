@@ -1,4 +1,4 @@
-//! Datasets that are made through the page.
+//! Datasets made through the page.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -36,7 +36,7 @@ fn wait(browser: &Browser, is: impl Fn(&Value) -> bool) -> Value {
     }
 }
 
-/// All files below a folder, by path.
+/// Returns all files below a folder, by path.
 fn files(root: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![root.to_owned()];
@@ -65,7 +65,7 @@ fn a_dataset_of_the_page_is_that_of_the_library() {
     assert_eq!(refused.status, StatusCode::CONFLICT);
     assert!(refused.text().contains("is being made: pause it first"));
 
-    // Paused after whole poses, with a contact sheet of those that are made.
+    // The run pauses after complete poses, with a contact sheet of the poses made.
     wait(&browser, |found| found["made"].as_u64() > Some(0));
     browser.post("/api/generation/pause", &folder).json();
     let paused = wait(&browser, |found| found["phase"] != "stopping");
@@ -80,7 +80,7 @@ fn a_dataset_of_the_page_is_that_of_the_library() {
     };
     let before = sheet(&browser);
 
-    // Another studio goes on from the files.
+    // Another studio continues from the files.
     let Browser { folder, case, .. } = browser;
     let browser = Browser::of(folder, case);
     assert_eq!(state(&browser)["made"], made);

@@ -1,4 +1,4 @@
-//! Grading by readers: names without meaning, grades that are kept, and labels of them.
+//! Grading by readers: meaningless names, saved grades, and labels from them.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn picture(browser: &Browser, name: &str) -> crate::browser::Answer {
     ))
 }
 
-/// The kinds of a PNG's chunks.
+/// Returns the types of a PNG's chunks.
 fn chunks(png: &[u8]) -> Vec<[u8; 4]> {
     let mut kinds = Vec::new();
     let mut rest = &png[8..];
@@ -95,7 +95,7 @@ fn a_grade_is_saved_at_once_and_found_again() {
         text,
         format!("image,reader,grade\n{a},Anna,1.5\n{b},Anna,2.5\n")
     );
-    // The key is the one that is there, whatever seed the page asks for.
+    // The existing key is used, whatever seed the page sends.
     let mut again = begin("Anna");
     again["seed"] = json!(4);
     let again = browser.post("/api/grading", &again).json();
@@ -140,7 +140,7 @@ fn grades_of_all_readers_become_labels() {
     let quality = browser.get("/api/dataset?folder=ankles").json();
     assert_eq!(quality["poses"][0]["label"]["label"], 1.5);
     assert_eq!(quality["poses"][0]["label"]["source"], "readers");
-    // The same as the command, whose files they are.
+    // The command writes the same files.
     let here = browser.folder.path();
     let key = read_key(&here.join("graded.key.csv")).unwrap();
     let sheets = ["Anna", "Ben"].map(|reader| here.join(format!("graded/grades_{reader}.csv")));

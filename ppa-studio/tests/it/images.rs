@@ -114,7 +114,7 @@ fn of_many_depth_requests_at_once_few_are_computed() {
     });
     let answers = browser.send_all(requests.collect());
     let count = |status| answers.iter().filter(|a| a.status == status).count();
-    // The newest, and those that began before the next one came.
+    // The newest, and those that began before the next one arrived.
     assert!((1..20).contains(&count(StatusCode::OK)));
     assert_eq!(count(StatusCode::OK) + count(StatusCode::CONFLICT), 100);
     let next = browser.post("/api/depth", &json!({ "angle_deg": 3.0 }));
@@ -161,7 +161,7 @@ fn only_a_later_radiograph_ends_the_one_under_way() {
     let [first, last] = ["/api/radiograph/first", "/api/radiograph/final"];
     assert_eq!(statuses([last, first]), [ended, ok]);
     assert_eq!(statuses(["/api/dose", first]), [ended, ok]);
-    // Depth images of this pose may come late, when the ones before took long.
+    // Depth images of this pose may arrive late if the previous ones took long.
     assert_eq!(statuses([first, "/api/depth"]), [ok, ok]);
 }
 
@@ -203,7 +203,7 @@ fn commands_name_the_files_and_options_of_the_page() {
     let state = browser.get("/api/state").json();
     let prepare = state["commands"]["prepare"].as_str().unwrap();
     assert!(prepare.contains("p01.nii --side r --bones "), "{prepare}");
-    // No option takes filters away.
+    // No option removes filters.
     let bare = browser.post("/api/commands", &json!({ "filters": [] }));
     assert_eq!(bare.json()["need_saved_plan"], true);
     let commands = browser
@@ -294,7 +294,7 @@ fn a_body_shape_is_that_of_the_plans_dataset() {
             if z_mm.0[0] == 0 {
                 continue;
             }
-            // Files hold whole millimetres.
+            // Files store whole millimetres.
             let [low, high] =
                 [-0.51, 0.51].map(|by| false_colour(f64::from(z_mm.0[0]) + by, range));
             let between = (0..3).all(|c| {

@@ -1,4 +1,4 @@
-//! Bodies beside the limb that are kept as parts of it.
+//! Bodies next to the limb that are kept as parts of it.
 
 use std::path::{Path, PathBuf};
 
@@ -15,12 +15,12 @@ use crate::chromium::{Page, run};
 
 const VOXEL_MM: f64 = 2.0;
 
-/// P01 with a block of 40 mm in the air beside the calf, and its case; the centre of the block.
+/// Writes P01 with a 40 mm block in the air next to the calf, and its case; also returns the centre of the block.
 fn with_block(folder: &Path) -> (PathBuf, [f64; 3]) {
     let leg = LowerLeg::p01();
     let scan = leg.voxelise(VOXEL_MM, TableTop::Absent).unwrap();
     let size = scan.grid().size();
-    // As many columns again as the block and the air before it need.
+    // Additional columns for the block and the air before it.
     let more = 32;
     let spacing = scan.grid().spacing_mm();
     let origin = scan.grid().centre([-(more as f64), 0.0, 0.0]);
@@ -45,7 +45,7 @@ fn with_block(folder: &Path) -> (PathBuf, [f64; 3]) {
     (file, grid.centre(centre.map(|v| v as f64)).into())
 }
 
-/// The case of the scan as `ppa prepare --keep` makes it.
+/// Makes the case of the scan like `ppa prepare --keep`.
 fn prepared(folder: &Path, kept: &[[f64; 3]]) -> (Case, PreparedLimb) {
     let surface = LimbSettings {
         kept: kept.to_vec(),
@@ -56,7 +56,7 @@ fn prepared(folder: &Path, kept: &[[f64; 3]]) -> (Case, PreparedLimb) {
     prepare(&scan, &reading, Side::Right, &surface, &choices).unwrap()
 }
 
-/// Mean of the vertices that are shown of what was removed, and the number of triangles.
+/// Returns the mean of the displayed vertices of the removed parts, and their number of triangles.
 fn removed(browser: &Browser) -> ([f64; 3], usize) {
     let answer = browser.get("/api/removed");
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
@@ -81,7 +81,7 @@ fn a_kept_body_is_that_of_the_command_and_is_undone() {
     let browser = Browser::of(folder, file);
     let before = browser.get("/api/state").json();
     assert_eq!(kept_points(&before), 0);
-    // What was removed is the block, which no longer is when it is kept.
+    // The removed part is the block, until it is kept.
     let (middle, triangles) = removed(&browser);
     let off = std::iter::zip(middle, block).map(|(a, b)| (a - b).abs());
     assert!(off.fold(0.0, f64::max) < 0.5, "{middle:?} {block:?}");
@@ -104,7 +104,7 @@ fn a_kept_body_is_that_of_the_command_and_is_undone() {
         "{command}"
     );
 
-    // The command finds the same, and so does whoever reads the changed case.
+    // The command and the changed case give the same result.
     let (expected, limb) = prepared(browser.folder.path(), &[block]);
     let edited = Case::read(&browser.folder.path().join("p01.edited.case.toml")).unwrap();
     assert_eq!(edited.surface, expected.surface);
@@ -173,8 +173,7 @@ fn a_removed_ball_is_that_of_the_command_and_is_undone() {
     );
 }
 
-/// The place of a point in the canvas in three dimensions, as the page first looks at the skin: 30 degrees wide, turned by -0.6 and
-/// 0.25 rad.
+/// Returns the place of a point on the canvas of the initial 3D view: field of view of 30 degrees, rotated by -0.6 and 0.25 rad.
 fn on_screen(point: [f64; 3], skin: &ppa_mesh::Mesh, [width, height]: [f64; 2]) -> [f64; 2] {
     use nalgebra::{Point3, Vector3};
     let (azimuth, elevation) = (-0.6_f64, 0.25_f64);
@@ -204,7 +203,7 @@ fn on_screen(point: [f64; 3], skin: &ppa_mesh::Mesh, [width, height]: [f64; 2]) 
     [0.5 * (width + u * height), 0.5 * (1.0 - v) * height]
 }
 
-/// Orange pixels of the view in three dimensions, as they are seen.
+/// Counts the orange pixels of the 3D view.
 async fn orange(page: &Page) -> usize {
     let place = "(() => { const r = document.querySelector('#view3d canvas').getBoundingClientRect(); \
                  return [r.x, r.y, r.width, r.height].map(Math.floor); })()";
@@ -219,7 +218,7 @@ async fn orange(page: &Page) -> usize {
     view.pixels().filter(|pixel| is_orange(pixel.0)).count()
 }
 
-/// Waits until what was removed is shown in the view in three dimensions, or nothing is.
+/// Waits until the 3D view shows the removed parts, or does not.
 async fn until_removed_is_shown(page: &Page, shown: bool) {
     for _ in 0..200 {
         if (orange(page).await > 200) == shown {
@@ -239,7 +238,7 @@ fn a_body_is_kept_and_removed_by_buttons() {
         page.click("#tab-skin").await;
         let bodies = "document.getElementById('bodies').textContent";
         page.wait(&format!("{bodies}.includes('removed: ')")).await;
-        // In the view in three dimensions, what was removed is orange, and nothing is where it is not to be shown.
+        // The removed parts are orange in the 3D view; there is no orange if they are hidden.
         until_removed_is_shown(&page, true).await;
         page.picture("skin_removed").await;
         page.click("#show-removed").await;
@@ -265,7 +264,7 @@ fn a_body_is_kept_and_removed_by_buttons() {
         page.click("#bodies [aria-label^='Remove']").await;
         page.wait(&format!("!{bodies}.includes('kept: ')")).await;
 
-        // Clicks on the block in three dimensions.
+        // Clicks on the block in the 3D view.
         let size = page.value("(() => { const c = document.querySelector('#view3d canvas'); return [c.clientWidth, c.clientHeight]; })()").await;
         let size: [f64; 2] = serde_json::from_value(size).unwrap();
         let skin = prepared(page.folder.path(), &[]).1.limb.mesh.clone();

@@ -1,4 +1,4 @@
-//! Frames that networks judge as a recorder writes them.
+//! Predictions of networks for frames as a recorder writes them.
 
 use std::fs;
 use std::path::Path;
@@ -27,7 +27,7 @@ const REGIONS: [Roi; 2] = [
     },
 ];
 
-/// A folder whose frames are watched.
+/// Opens the watch of a folder's frames.
 pub fn watching(folder: &Path) -> Opening {
     let frames = folder.join("frames");
     fs::create_dir(&frames).unwrap();
@@ -42,7 +42,7 @@ pub fn watching(folder: &Path) -> Opening {
     }
 }
 
-/// Writes the frames of both cameras, which are `seed` mm farther than those of another moment.
+/// Writes the frames of both cameras, with depths shifted by `seed` mm.
 pub fn write_frames(folder: &Path, name: &str, seed: u16) {
     for (camera, offset) in [("left", 0), ("right", 40)] {
         let value = |x: u32, y: u32| image::Luma([700 + seed + offset + (x * y % 300) as u16]);
@@ -86,10 +86,10 @@ fn the_newest_frames_are_judged_as_by_predict() {
     assert_eq!(shown["answer"]["prediction"], json!(expected));
     let age = |shown: &Value| shown["age_s"].as_f64().unwrap();
     assert!((0.0..600.0).contains(&age(&shown)), "{shown}");
-    // Nothing newer; a page that is opened later sees the same.
+    // There is nothing newer; a page opened later sees the same pair.
     assert_eq!(browser.get("/api/live/2").status, StatusCode::NO_CONTENT);
     assert_eq!(report(&browser.get("/api/live/0"))["number"], 2);
-    // Frames of an hour ago say so, however soon they are judged.
+    // Frames written an hour ago have that age, however soon the prediction follows.
     write_frames(frames, "third", 0);
     for camera in ["left", "right"] {
         let file = frames.join(format!("frames/depth_cam_{camera}_third.png"));

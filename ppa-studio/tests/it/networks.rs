@@ -1,4 +1,4 @@
-//! Networks that judge the poses of the page.
+//! Networks that predict the quality of the page's poses.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 
 use crate::browser::{Browser, phantom};
 
-/// A folder with networks of the left and of the right camera after a step each.
+/// Trains networks of the left and of the right camera for one step each.
 pub fn networks() -> Networks {
     static TRAINED: LazyLock<TempDir> = LazyLock::new(|| {
         let folder = tempfile::tempdir().unwrap();
@@ -25,7 +25,7 @@ pub fn networks() -> Networks {
             write_person(&folder.path().join(format!("data/patient_{patient}")));
         }
         for views in ["left", "right"] {
-            // From torchvision's first values and with statistics of the training images, outputs follow images after a step.
+            // With torchvision's initial values and statistics of the training images, outputs depend on the images after one step.
             let text = format!(
                 "preset = \"quick\"\nviews = {views:?}\nmirror = true\nside = 32\nsteps = 1\nbatch_size = 4\n\
                  recompute_statistics = 4\nnetwork.last_layer = \"torchvision\"\n\
@@ -47,7 +47,7 @@ pub fn networks() -> Networks {
     }
 }
 
-/// Two poses of a person in images of gradients.
+/// Writes two poses of a patient with images of gradients.
 fn write_person(root: &Path) {
     let (depth, labels) = (root.join("depth/l/orig"), root.join("labels/l"));
     fs::create_dir_all(&depth).unwrap();

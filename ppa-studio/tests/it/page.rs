@@ -1,4 +1,4 @@
-//! The page in Chromium: each step as a person takes it.
+//! The page in Chromium: each step as used by a person.
 
 use fantoccini::Locator;
 use ppa_generate::Case;
@@ -22,7 +22,7 @@ fn slices_follow_keys_and_the_window() {
         let canvas = page.client.find(canvas).await.unwrap();
         canvas.send_keys("\u{e013}").await.unwrap(); // arrow up
         page.wait(&format!("{caption} !== {before}")).await;
-        // Brighter through a lower level.
+        // A lower level is brighter.
         let light = "(() => { const c = document.querySelector('[data-axis=\"2\"] canvas'); \
                      const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \
                      let s = 0; for (let i = 0; i < d.length; i += 4) s += d[i]; return s; })()";
@@ -33,7 +33,7 @@ fn slices_follow_keys_and_the_window() {
     });
 }
 
-/// The farthest pixels of the crop's box at the right, in the slice across the third axis.
+/// Place of the right edge of the crop box in the slice across the third axis.
 const CROP_EDGE: &str = "(() => { const c = document.querySelector('[data-axis=\"2\"] canvas'); \
                          const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let [x, y] = [0, 0]; \
                          for (let i = 0; i < d.length; i += 4) if (d[i] > 230 && Math.abs(d[i + 1] - 180) < 20 && d[i + 2] < 110) \
@@ -91,7 +91,7 @@ fn a_dragged_edge_crops_the_scan() {
     });
 }
 
-/// Middle of the joint's mark in the slice across the second axis: of the pixels that have its colour.
+/// Centre of the joint's mark in the slice across the second axis, from the pixels of its colour.
 const JOINT: &str = "(() => { const c = document.querySelector('[data-axis=\"1\"] canvas'); \
                      const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let [n, x, y] = [0, 0, 0]; \
                      for (let i = 0; i < d.length; i += 4) if (d[i] === 255 && d[i + 1] === 122 && d[i + 2] === 217) \
@@ -133,7 +133,7 @@ fn a_dragged_landmark_is_saved_and_undone() {
         page.wait(&format!("!{joint}.includes('chosen')")).await;
         assert_eq!(Case::read(&edited).unwrap().choices.joint_centre, None);
 
-        // A region by its number, found again by its button.
+        // A region set by its number, and found again by its button.
         page.fill("#joint_region-from", "9").await;
         page.wait(
             "document.querySelectorAll('#landmark-table tbody tr')[1].textContent.includes('chosen')",
@@ -181,7 +181,7 @@ fn a_body_shape_is_shown_with_its_shift_in_step_2_only() {
         page.wait(&format!("{legend} === ''")).await;
         page.click("#tab-skin").await;
         page.wait(&format!("{legend}.includes('Moved by')")).await;
-        // Left before the surface has come, the step leaves none behind.
+        // If the step is left before the surface arrives, the surface is not shown.
         page.pick("skin-shape", "big").await;
         page.click("#tab-landmarks").await;
         page.wait(&format!("{legend} === ''")).await;
@@ -211,14 +211,14 @@ fn images_follow_the_sliders_and_the_newest_wins() {
         page.wait("!!document.querySelector('#depth img').src")
             .await;
         page.picture("whatif").await;
-        // A hundred events within a second: the last one is what is shown.
+        // Of a hundred events within a second, the last one is shown.
         for step in 0..100 {
             page.slide("slider-angle_deg", f64::from(step) * 0.5).await;
         }
         page.slide("slider-angle_deg", 18.0).await;
         page.wait("document.querySelector('#command-list').textContent.includes('--angle 18 ')")
             .await;
-        // Offered when the radiograph of the newest exposure is whole.
+        // The dose is offered when the radiograph of the newest exposure is complete.
         page.wait("!document.getElementById('dose-begin').disabled")
             .await;
         page.picture("guide_whatif").await;
@@ -235,7 +235,7 @@ fn images_follow_the_sliders_and_the_newest_wins() {
             json!("20")
         );
 
-        // The steps are addresses: back leads to the one before.
+        // Each step has an address: back leads to the previous one.
         page.click("#tab-room").await;
         page.wait("document.querySelector('#room-facts').textContent.includes('Focal spot')")
             .await;

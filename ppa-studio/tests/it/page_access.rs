@@ -1,4 +1,4 @@
-//! The page for people who cannot see it, see little, or have a narrow screen.
+//! Accessibility of the page: blindness, low vision and narrow screens.
 
 use serde_json::json;
 
@@ -16,7 +16,7 @@ const STEPS: [&str; 8] = [
     "training",
 ];
 
-/// Controls that can be seen and have no name for a screen reader.
+/// Visible controls without a name for a screen reader.
 pub const NAMELESS: &str = "[...document.querySelectorAll('button, input, select, canvas, progress, img, [role=group]')] \
     .filter((e) => e.checkVisibility() && !(e.tagName === 'IMG' && !e.src)) \
     .filter((e) => !(e.getAttribute('aria-label') || e.getAttribute('alt') || e.labels?.[0]?.textContent.trim() \
@@ -24,7 +24,7 @@ pub const NAMELESS: &str = "[...document.querySelectorAll('button, input, select
         || (e.tagName === 'BUTTON' && e.textContent.trim()))) \
     .map((e) => e.outerHTML.slice(0, 120))";
 
-/// Texts whose contrast with their ground is below 4.5 (WCAG 2.2, level AA); controls that are off are exempt.
+/// Texts with a contrast to their background below 4.5 (WCAG 2.2, level AA), except in disabled controls.
 pub const FAINT: &str = "(() => { \
     const parts = (colour) => colour.match(/[\\d.]+/g).map(Number); \
     const light = (colour) => parts(colour).slice(0, 3).map((v) => v / 255) \
@@ -44,7 +44,7 @@ pub const FAINT: &str = "(() => { \
             return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 120)]; }) \
         .filter(([ratio]) => ratio < 4.5); })()";
 
-/// The page of a plan whose dataset is made.
+/// Opens the page of a plan and its dataset.
 async fn page_of_plan() -> Page {
     let folder = tempfile::tempdir().unwrap();
     dataset(folder.path());
@@ -89,7 +89,7 @@ fn a_narrow_page_scrolls_only_down() {
     });
 }
 
-/// What axe-core, in the file that `PPA_AXE` names, finds against WCAG 2.2, levels A and AA, and its own best practices.
+/// axe-core, in the file named by `PPA_AXE`, must find no violation of WCAG 2.2, levels A and AA, or of its best practices.
 #[test]
 #[ignore = "needs chromium, chromedriver and axe-core"]
 fn axe_core_finds_nothing_against_the_page() {

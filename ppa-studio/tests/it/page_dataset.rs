@@ -50,14 +50,14 @@ fn an_outlier_is_shown_and_opened_in_its_pose() {
         )
         .await;
 
-        // As many series as the legend has look different, also without colours that repeat.
+        // The series of the legend have different styles, and series of the same colour different shapes.
         let looks = "import('/page/charts.js').then(({ MOST_SERIES, styleOf }) => { \
                      const all = Array.from({ length: MOST_SERIES }, (_, n) => JSON.stringify(styleOf(n))); \
                      const shapes = new Set(Array.from({ length: MOST_SERIES / 8 }, (_, n) => styleOf(8 * n).shape)); \
                      return [new Set(all).size, shapes.size, styleOf(MOST_SERIES).colour === styleOf(0).colour]; })";
         assert_eq!(page.value(looks).await, json!([32, 4, true]));
 
-        // A point of a chart is a pose; so is an angle that is typed.
+        // Clicking a point of a chart or typing an angle selects a pose.
         page.click(".chart .pose").await;
         page.wait("document.getElementById('pose').dataset.step === '0'")
             .await;
@@ -130,7 +130,7 @@ fn a_reader_grades_by_keys_and_the_labels_follow() {
         };
         assert_eq!(grades(), ["2.5", "3.0"]);
 
-        // Loaded again, the page is still that of a reader, who goes on where they were.
+        // After a reload, the page is still that of a reader, who continues at the same picture.
         page.client.refresh().await.unwrap();
         begin().await;
         for n in 3..=13 {

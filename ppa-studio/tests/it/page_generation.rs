@@ -19,13 +19,13 @@ fn a_plan_is_changed_and_its_dataset_made() {
             .await;
         page.picture("plan").await;
 
-        // A field says which numbers it accepts when it is entered.
+        // A field with the focus shows which numbers it accepts.
         page.click("[id='plan:soft_tissue.distal_mm']").await;
         page.wait("document.getElementById('plan:soft_tissue.distal_mm:hint').textContent.endsWith('Accepted: at least 0, at most 20.')")
             .await;
         page.picture("plan_limits").await;
 
-        // A value that the plan refuses is said at its field.
+        // A value refused by the plan is reported at its field.
         page.fill("[id='plan:rotation.step_deg']", "0.3").await;
         let refused = "document.getElementById('plan:rotation.step_deg:refused').textContent";
         page.wait(&format!("{refused}.includes('step_deg')")).await;
@@ -67,7 +67,7 @@ fn a_plan_is_changed_and_its_dataset_made() {
         page.wait("document.getElementById('command-list').textContent.includes('ppa generate')")
             .await;
 
-        // A reload shows what the files hold; the run goes on from there.
+        // A reload shows the state of the files, from which the run continues.
         page.client.refresh().await.unwrap();
         page.wait(
             "['Paused.', 'Complete.'].includes(document.getElementById('phase').textContent)",
@@ -134,7 +134,7 @@ fn cameras_and_materials_are_chosen_and_written_out() {
         page.click("#tab-generation").await;
         let field = |key: &str| format!("document.getElementById('plan:{key}')");
         page.wait(&format!("!!{}", field("depth.rig"))).await;
-        // A rig that cannot be read is named with the reason.
+        // An unreadable rig is named with the reason.
         page.wait(&format!(
             "/^cut.rig.json cannot be read: .*line 1/.test({}.textContent)",
             field("depth.rig:unreadable")
@@ -175,7 +175,7 @@ fn cameras_and_materials_are_chosen_and_written_out() {
         ))
         .await;
         page.picture("plan_cameras").await;
-        // The page cannot leave a number out that the plan needs.
+        // The page cannot remove a number that the plan requires.
         let standard = "document.querySelector(\"[aria-label='Default of depth.cameras.left.camera.fx']\").hidden";
         assert_eq!(page.value(standard).await, json!(true));
         page.click("#plan-undo").await;

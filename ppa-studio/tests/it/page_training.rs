@@ -1,4 +1,4 @@
-//! Step 8 of the page in Chromium: trainings, and frames as they come.
+//! Step 8 of the page in Chromium: training runs and watched frames.
 
 use ppa_studio::Opening;
 use serde_json::json;
@@ -30,7 +30,7 @@ fn trainings_are_compared_and_their_errors_shown() {
         page.wait(&format!("{lines} === 3")).await;
         page.click("[id='training-of-later/stopped']").await;
         page.wait(&format!("{lines} === 2")).await;
-        // A training that runs is followed.
+        // An active training run is followed.
         let log = page.folder.path().join("runs/later/stopped/log.jsonl");
         let row = r#"{"step":7,"seconds":0.5,"training/loss":0.125}"#;
         std::fs::write(log, format!("{row}\n")).unwrap();

@@ -1,4 +1,4 @@
-//! The view in three dimensions, the keyboard alone, and a program that has ended.
+//! The 3D view, use by keyboard only, and a program that has ended.
 
 use std::time::{Duration, Instant};
 
@@ -13,10 +13,10 @@ const VIEW: &str = "#view3d canvas";
 const JOINT: [u8; 3] = [255, 122, 217];
 const PLANE: [u8; 3] = [126, 231, 135];
 
-/// Whether the surface and the landmarks are there.
+/// Whether the landmarks are shown.
 const READY: &str = "document.getElementById('landmark-table').textContent.includes('Plane')";
 
-/// Middles of all square marks of a colour in the view, in the page, from above to below.
+/// Returns the centres of all square marks of a colour in the view, in page coordinates, from top to bottom.
 async fn marks(page: &Page, colour: [u8; 3]) -> Vec<[f64; 2]> {
     let ([left, top, ..], picture) = page.seen(VIEW).await;
     let is_mark = |x: u32, y: u32| {
@@ -43,7 +43,7 @@ fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// The marks of a colour as soon as they are as expected, and stay so from one picture to the next.
+/// Waits until the marks of a colour are as expected and do not change between two pictures.
 async fn marks_when(
     page: &Page,
     colour: [u8; 3],
@@ -62,7 +62,7 @@ async fn marks_when(
     }
 }
 
-/// Joint and plane, as they are shown (`landmarks`) or found (`automatic`): `ct` frame, mm.
+/// Returns the displayed (`landmarks`) or automatic (`automatic`) joint and plane, `ct` frame, mm.
 async fn landmarks(page: &Page, which: &str) -> ([f64; 3], [[f64; 3]; 3]) {
     let ask = "fetch('/api/state').then((r) => r.json()).then(arguments[0])";
     let state = page.client.execute_async(ask, vec![]).await.unwrap();
@@ -75,7 +75,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Drags the joint and a point of the plane with the mouse, and reads what is saved.
+/// Drags the joint and a point of the plane with the mouse, and reads the saved landmarks.
 async fn drag_landmarks(page: Page) {
     page.wait(READY).await;
     page.click("#tab-landmarks").await;
@@ -95,12 +95,12 @@ async fn drag_landmarks(page: Page) {
     page.wait(&row(0)).await;
     let chosen = case().choices.joint_centre.unwrap();
     let moved = distance(chosen, joint_found);
-    // To the right on the screen, which is across the patient and level: the view looks from the front, a little from the right.
+    // To the right on the screen, horizontally across the patient: the view is from the front, slightly from the right.
     assert!((5.0..60.0).contains(&moved), "{moved}");
     assert!((chosen[2] - joint_found[2]).abs() < 2.0, "{chosen:?}");
     assert!(chosen[0] > joint_found[0], "{chosen:?}");
 
-    // The points of the plane lie on the back of the limb, where they cannot be held from the front.
+    // The points of the plane are on the back of the limb and cannot be grabbed from the front.
     let front = marks(&page, PLANE).await;
     let canvas = page.client.find(Locator::Css(VIEW)).await.unwrap();
     canvas.send_keys(&"\u{e014}".repeat(31)).await.unwrap(); // arrow right: by 3.1 rad
@@ -138,7 +138,8 @@ fn landmarks_are_dragged_without_webgl() {
     run(async { drag_landmarks(Page::without_webgl().await).await });
 }
 
-/// Share of what is drawn in a picture that another one does not show within a pixel, to `limit` in red, green and blue. The caption is left out.
+/// Returns the share of drawn pixels without a match in the other picture within one pixel, to `limit` in red, green and blue.
+/// Leaves out the caption.
 fn missing(picture: &RgbImage, other: &RgbImage, limit: u8) -> f64 {
     const GROUND: [u8; 3] = [10, 13, 18];
     let differ = |a: [u8; 3], b: [u8; 3]| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap();
@@ -153,7 +154,7 @@ fn missing(picture: &RgbImage, other: &RgbImage, limit: u8) -> f64 {
             missing += u32::from(!is_there);
         }
     }
-    // An empty view shows nothing of any other.
+    // An empty view counts as missing entirely.
     if drawn > 2000 {
         f64::from(missing) / f64::from(drawn)
     } else {
@@ -182,7 +183,7 @@ fn a_browser_without_webgl_shows_the_same_views() {
                         .await;
                 }
             }
-            // WebGL smooths edges, and draws lines fainter for it.
+            // WebGL smooths edges, which makes lines fainter.
             let limit = if step == "room" { 140 } else { 30 };
             let started = Instant::now();
             loop {
@@ -238,7 +239,7 @@ fn a_landmark_is_placed_by_keys_alone() {
     });
 }
 
-/// Drags a camera, and the middle of what it sees: both stay under the mouse, and the sliders follow.
+/// Drags a camera and its aim point: both stay under the mouse, and the sliders follow.
 #[test]
 #[ignore = "needs chromium and chromedriver"]
 fn cameras_are_dragged_in_three_dimensions() {
@@ -257,7 +258,7 @@ fn cameras_are_dragged_in_three_dimensions() {
         let four = |marks: &[[f64; 2]]| marks.len() == 4;
         marks_when(&page, WHITE, four).await;
         page.picture("cameras_before").await;
-        // Cameras hang above what they see.
+        // Cameras are above their aim points.
         for (mark, kind) in [(0, 0..3), (3, 3..6)] {
             let unmoved = values().await;
             let from = marks_when(&page, WHITE, four).await[mark];
@@ -269,7 +270,7 @@ fn cameras_are_dragged_in_three_dimensions() {
                 .filter(|(_, (a, b))| *a != b)
                 .map(|(i, _)| i)
                 .collect();
-            // Of one camera, and only where it is or only where it looks.
+            // Only one camera changes, and only its position or only its direction.
             assert!(!moved.is_empty());
             assert!(
                 moved
@@ -307,7 +308,7 @@ fn a_page_goes_on_when_the_program_starts_again() {
         page.wait("document.querySelectorAll('#landmark-table tbody tr')[0].textContent.includes('chosen')")
             .await;
 
-        // A program that was started again unnoticed has what was saved.
+        // A program restarted without notice has the saved state.
         page.stop();
         page.start_again();
         page.click("#undo").await;

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::browser::{Answer, Browser};
 use crate::plans::plan;
 
-/// A table in which all that is not air is water.
+/// A table in which everything except air is water.
 pub const WATER: &str = "\
 [[segment]]
 name = \"air\"
@@ -25,7 +25,7 @@ material = \"water\"
 density = [[0, 1.0]]
 ";
 
-/// Writes a rig with small images, and a table of materials, beside the plan.
+/// Writes a rig with small images, and a table of materials, next to the plan.
 pub fn write_files(folder: &Path) -> RigSpec {
     let mut rig = RigSpec::default();
     for mounted in [&mut rig.left, &mut rig.right] {
@@ -58,7 +58,7 @@ fn edited(browser: &Browser) -> Plan {
     Plan::read(&browser.folder.path().join("ankles.edited.toml")).unwrap()
 }
 
-/// Columns of both depth images that step 5 shows.
+/// Returns the total columns of both depth images in step 5.
 fn columns(browser: &Browser) -> u32 {
     let answer = browser.post("/api/depth", &json!({ "angle_deg": 5.0 }));
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
@@ -81,7 +81,7 @@ fn files_are_offered_where_they_can_be_read() {
         assert_eq!(field["kind"], "file");
         field["names"].clone()
     };
-    // A table that cannot be read is named with the reason; JSON that is no rig is another file.
+    // An unreadable table is named with the reason; JSON without a rig is ignored.
     let unreadable = |key: &str| field(&form, key)["unreadable"].clone();
     assert_eq!(unreadable("depth.rig"), json!([]));
     let reason = &unreadable("xray.calibration_file")[0];
@@ -112,7 +112,7 @@ fn a_chosen_rig_holds_for_images_and_forecast() {
     let shown = field(&form, focal)["default"].as_str().unwrap().parse();
     assert_eq!(shown, Ok(rig.left.camera.fx));
 
-    // A camera of its own: the rig is written out with it, undone and redone as one change.
+    // Changing a camera writes out the rig, and is undone and redone as one change.
     let form = set(&browser, focal, json!("260.5")).json();
     let expected = {
         let mut rig = rig.clone();

@@ -44,7 +44,7 @@ fn a_changed_setting_is_saved_beside_the_plan() {
     let text = std::fs::read_to_string(&edited).unwrap();
     assert_eq!(text, before.replace("step_deg = 5.0 ", "step_deg = 2.5 "));
 
-    // Images of the page follow the plan, and the next studio goes on from there.
+    // Images of the page follow the plan, and the next studio continues with it.
     set(&browser, "xray.kvp", json!("70")).json();
     assert_eq!(browser.get("/api/state").json()["planned"]["kvp"], 70.0);
     let Browser { folder, case, .. } = browser;
@@ -74,7 +74,7 @@ fn a_changed_setting_is_saved_beside_the_plan() {
     );
     assert!(edited_text().contains("kvp = 80"), "{}", edited_text());
 
-    // Over the original on request alone; the default of a key is the key left out.
+    // The original is overwritten on request only; a key is set to its default by removing it.
     set(&browser, "xray.kvp", Value::Null).json();
     let form = browser.post("/api/plan/save", &json!({})).json();
     assert_eq!(form["has_edits"], false);
@@ -99,7 +99,7 @@ fn settings_that_the_library_refuses_are_not_saved() {
         assert!(answer.text().contains(words), "{}", answer.text());
     }
     assert!(!edited.exists());
-    // Another program, or another studio.
+    // A change by another program or studio.
     set(&browser, "seed", json!("8")).json();
     std::fs::write(&edited, "version = 1\n").unwrap();
     let answer = set(&browser, "seed", json!("9"));
@@ -163,7 +163,7 @@ fn limbs_are_added_from_the_folder_and_removed() {
     let browser = opened();
     let folder = browser.folder.path();
     let case = std::fs::read_to_string(folder.join("p01.case.toml")).unwrap();
-    // Another scan by its hash, and the other leg of the same scan.
+    // Another scan, identified by its hash, and the other leg of the same scan.
     let scan = Case::read(&folder.join("p01.case.toml"))
         .unwrap()
         .source
@@ -189,7 +189,7 @@ fn limbs_are_added_from_the_folder_and_removed() {
     };
     let named = |case: &str, patient| (case.to_owned(), patient);
     let first = named("p01.case.toml", 4);
-    // The same scan is the same person, another one the next.
+    // The same scan gives the same patient, another scan the next.
     change(json!({ "add": { "case": "left.case.toml" } })).json();
     let form = change(json!({ "add": { "case": "p02.case.toml" } })).json();
     let left = named("left.case.toml", 4);
@@ -258,7 +258,7 @@ fn limits_of_a_field_are_those_of_the_plan() {
     // Angles are multiples of half a degree, and steps divide the sweep.
     assert_eq!(limits("rotation.step_deg"), Value::Null);
     assert_eq!(limits("rotation.from_deg"), Value::Null);
-    // What is refused beyond a limit is accepted at it or just within.
+    // Values are refused beyond a limit and accepted at it or just within.
     for key in [
         "xray.kvp",
         "xray.detector.columns",
@@ -298,7 +298,7 @@ fn limits_of_a_field_are_those_of_the_plan() {
             browser.post("/api/plan/undo", &json!({})).json();
         }
     }
-    // At its own limit a whole number has limits as well.
+    // A whole number at its limit has limits as well.
     set(&browser, "xray.detector.columns", json!("1")).json();
     assert_eq!(limits("xray.detector.columns")["low"], limit(1.0, true));
     assert_eq!(limits("depth.rig"), Value::Null);

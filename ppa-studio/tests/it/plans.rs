@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::browser::{copy, fine_phantom, phantom};
 
-/// Six poses with one body shape and small radiographs; with comments.
+/// Commented plan of six poses with one body shape and small radiographs.
 const PLAN: &str = "\
 # Of the house.
 version = 1
@@ -46,7 +46,7 @@ pub const LIMB: LimbId = LimbId {
 /// Poses of the plan.
 pub const POSES: usize = 6;
 
-/// The phantom and its plan in a folder.
+/// Writes the phantom and its plan into a folder.
 pub fn plan(folder: &Path) -> PathBuf {
     phantom(folder);
     write_plan(folder)
@@ -58,8 +58,8 @@ fn write_plan(folder: &Path) -> PathBuf {
     file
 }
 
-/// The dataset of the plan with poses every 2.5 degrees, with labels and a split. The left camera's image at 15 degrees stands out:
-/// its list says that the limb lay 4 mm higher.
+/// Writes the dataset of the plan with poses every 2.5 degrees, labels and a split. The left camera's image at 15 degrees is an
+/// outlier: its list entry has the limb 4 mm higher.
 pub fn dataset(folder: &Path) -> PathBuf {
     static MADE: LazyLock<TempDir> = LazyLock::new(|| {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Who is let in, and what is refused.
+//! Access to the page and refused requests.
 
 use axum::body::Body;
 use axum::http::StatusCode;
@@ -39,7 +39,7 @@ fn other_hosts_and_other_pages_are_refused() {
         assert_eq!(answer.status, StatusCode::FORBIDDEN);
         assert!(answer.text().contains(why), "{}", answer.text());
     }
-    // A forwarded port is another one than the program's.
+    // A forwarded port may differ from the program's.
     let mut forwarded = browser.posting("/api/undo", "{}".to_owned());
     let headers = forwarded.headers_mut();
     headers.insert(

@@ -1,4 +1,4 @@
-//! Trainings over HTTP: their list, logs, errors and images.
+//! Training runs over HTTP: list, logs, errors and images.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use crate::browser::{Browser, phantom};
 use crate::networks::networks;
 
-/// The folder of the networks of both cameras, and a training that was stopped.
+/// Writes the training runs of both cameras' networks, and a stopped run.
 pub fn folder_of_trainings(folder: &Path) {
     let networks = networks();
     for (name, run) in [("left", networks.left), ("right", networks.right.unwrap())] {
@@ -116,7 +116,7 @@ fn what_is_no_training_to_show_is_refused() {
         "no training is named",
     );
     refused(browser.get("/api/training/image/0?run=right"), "no error 0");
-    // Nothing of a limb is there.
+    // There is no limb.
     refused(browser.get("/api/state"), "no limb is open");
     refused(browser.get("/api/plan/form"), "no limb is open");
 }
