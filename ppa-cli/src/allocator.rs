@@ -4,10 +4,10 @@
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 use libc::{M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
 
-/// Keeps freed memory in the process instead of returning it to the system. A training step frees gradients of all weights and
-/// allocates as many in the next one; their pages would be mapped again each time, a quarter of the CPU time of `standard`.
+/// Keeps freed memory in the process instead of returning it to the system. A training step frees the gradients of all weights and
+/// allocates as many in the next one; otherwise their pages would be mapped again each time, a quarter of the CPU time of `standard`.
 ///
-/// Returns whether the allocator took the settings; only glibc's has them.
+/// Returns whether the allocator accepted the settings; only glibc has them.
 pub fn keep_freed_memory() -> bool {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
@@ -20,9 +20,9 @@ pub fn keep_freed_memory() -> bool {
 }
 
 /// Returns large blocks to the system as soon as they are freed. glibc keeps more of them the longer a program runs: the studio, whose
-/// images are computed by many threads, would hold nearly twice the memory it needs.
+/// images are computed on many threads, would use nearly twice the memory it needs.
 ///
-/// Returns whether the allocator took the setting; only glibc's has it.
+/// Returns whether the allocator accepted the setting; only glibc has it.
 pub fn return_freed_memory() -> bool {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
@@ -35,7 +35,7 @@ pub fn return_freed_memory() -> bool {
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn set(setting: i32, value: i32) -> bool {
-    // SAFETY: mallopt changes numbers of the allocator under the allocator's own lock and touches no memory of this program.
+    // SAFETY: mallopt changes parameters of the allocator under the allocator's own lock and touches no memory of this program.
     unsafe { libc::mallopt(setting, value) == 1 }
 }
 

@@ -1,4 +1,4 @@
-//! State of the tasks of a submission, from their files, their logs and the queue.
+//! State of the tasks of a submission, from their files, logs and the queue.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,14 +16,14 @@ use serde::Serialize;
 #[derive(Debug, Serialize)]
 pub struct JobReport {
     pub state: ShardState,
-    /// Poses that are made, trainings that are finished, or histories that are followed.
+    /// Number of finished poses, finished training runs, or simulated histories.
     pub made: u64,
-    /// Slurm's identifier, while it is in the queue.
+    /// Slurm's identifier while the job is in the queue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub job: Option<String>,
     #[serde(skip_serializing_if = "String::is_empty")]
     pub node: String,
-    /// Why it waits.
+    /// Why it is waiting.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub reason: String,
     /// Last line of its log.
@@ -31,11 +31,11 @@ pub struct JobReport {
     pub last_line: Option<String>,
 }
 
-/// A task by its number.
+/// A task with its number.
 #[derive(Debug, Serialize)]
 pub struct ShardReport {
     pub shard: u64,
-    /// The folder of the training that it makes.
+    /// Folder of the training run of this task.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub training: Option<String>,
     #[serde(flatten)]
@@ -45,22 +45,22 @@ pub struct ShardReport {
 /// All tasks of a folder, and the last job.
 #[derive(Debug, Serialize)]
 pub struct ClusterReport {
-    /// Poses, trainings or histories of all tasks.
+    /// Poses, training runs or histories of all tasks.
     #[serde(rename = "units")]
     pub all: u64,
-    /// Of these, those that are made.
+    /// Number of these that are finished.
     pub made: u64,
-    /// Tasks by state.
+    /// Number of tasks in each state.
     pub states: BTreeMap<ShardState, usize>,
     pub core_hours: CoreHours,
     pub shards: Vec<ShardReport>,
-    /// The merge, or the tables.
+    /// The job that merges or writes the tables.
     pub merge: JobReport,
     #[serde(skip)]
     names: Names,
 }
 
-/// Names of the work of a task and of the last job, and what the tasks make.
+/// Names of a task and of the last job, and the kind of their results.
 #[derive(Debug)]
 struct Names {
     task: &'static str,
@@ -68,11 +68,11 @@ struct Names {
     made: Made,
 }
 
-/// What the tasks make.
+/// Kind of a task's results.
 #[derive(Debug)]
 enum Made {
     Poses,
-    /// One a task.
+    /// One per task.
     Trainings,
     Histories,
 }
@@ -163,14 +163,14 @@ impl ClusterReport {
         })
     }
 
-    /// Tasks that are not done and have no job.
+    /// Tasks that are neither finished nor queued.
     pub fn lost(&self) -> Vec<u64> {
         let is_lost = |state| matches!(state, ShardState::Failed | ShardState::Missing);
         let lost = self.shards.iter().filter(|s| is_lost(s.report.state));
         lost.map(|shard| shard.shard).collect()
     }
 
-    /// Whether a task or the merge runs or waits, be it for a shard that is made again.
+    /// Whether a task or the merge is running or waiting, including shards that are repeated.
     pub fn is_under_way(&self) -> bool {
         let reports = self.shards.iter().map(|shard| &shard.report);
         let mut reports = reports.chain([&self.merge]);
@@ -196,7 +196,7 @@ impl ClusterReport {
         )
     }
 
-    /// The report in words: a line for each task that is not done, since there may be thousands.
+    /// The report as text: a line for each unfinished task, since there may be thousands of tasks.
     pub fn describe(&self) -> String {
         let states = self.states.iter();
         let states: Vec<_> = states.map(|(state, n)| format!("{n} {state}")).collect();
@@ -229,18 +229,18 @@ impl ClusterReport {
     }
 }
 
-/// What the files of a task show.
+/// State of a task according to its files.
 #[derive(Default)]
 struct Found {
     complete: bool,
     begun: bool,
     made: u64,
-    /// Whether some process writes it.
+    /// Whether a process is writing to it.
     written_now: bool,
 }
 
 impl Found {
-    /// A folder that was not begun or is damaged holds nothing that counts.
+    /// State of a dataset; the default if the folder is missing or damaged.
     fn dataset(root: &Path) -> Self {
         status(root).map_or(Self::default(), |found| Self {
             complete: found.complete,
@@ -260,7 +260,7 @@ impl Found {
         }
     }
 
-    /// By the headers of the tallies of a part. One that cannot be read holds nothing that counts.
+    /// State according to the headers of the tallies of a part; unreadable ones are ignored.
     fn histories(part: &Path, work: &HistoryWork) -> Self {
         let tallies = tallies(part).filter_map(|path| AnalogTally::read_histories(&path).ok());
         let tallies = tallies.filter(|found| found.of_run == work.divided.histories);
@@ -281,7 +281,7 @@ impl Found {
     }
 }
 
-/// The tallies in the folder of a part; none where it cannot be read.
+/// Paths of the tallies in the folder of a part; empty if it cannot be read.
 pub fn tallies(part: &Path) -> impl Iterator<Item = PathBuf> {
     let entries = std::fs::read_dir(part).into_iter().flatten().flatten();
     let tallies = entries.map(|entry| entry.path());

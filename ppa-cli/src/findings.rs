@@ -8,7 +8,7 @@ use ppa_generate::{Case, PreparedLimb};
 
 use crate::stderr::warning;
 
-/// Repeats those of datasets that are about to be used.
+/// Repeats the findings of datasets that are about to be used.
 pub fn repeat_of_datasets<'a>(datasets: impl Iterator<Item = &'a Path>) -> anyhow::Result<()> {
     for line in Findings::open_lines_of(datasets)? {
         warning(&line);

@@ -34,7 +34,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Program", &["completions", "man", "help"]),
 ];
 
-/// The command line. clap has no headings for subcommands, so the listing is part of the template of the help.
+/// The command line. clap has no headings for subcommands, so the list is part of the help template.
 pub fn command() -> Command {
     let command = Cli::command();
     let template = template(&command);
@@ -52,7 +52,7 @@ fn template(command: &Command) -> String {
     for (heading, names) in GROUPS {
         let _ = writeln!(text, "{header}{heading}:{header:#}");
         for name in *names {
-            // Absent where its feature is off.
+            // Absent if its feature is off.
             let Some(subcommand) = built.find_subcommand(name) else {
                 continue;
             };

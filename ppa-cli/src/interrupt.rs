@@ -1,4 +1,4 @@
-//! Ctrl-C and TERM end a command at its next whole step. A second one ends it at once.
+//! Ctrl-C and TERM end a command after its current step. A second signal ends it at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -15,7 +15,7 @@ use crate::stderr;
 
 const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
 
-/// How long a signal waits until it is seen, at most.
+/// Longest time until a signal is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Whether Ctrl-C was pressed or TERM was sent since [`Interrupt::listen`].
@@ -26,12 +26,12 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Begins to listen.
+    /// Starts to listen.
     pub fn listen() -> anyhow::Result<Self> {
         let asked = Arc::new(AtomicBool::new(false));
         let signal = Arc::new(AtomicUsize::new(0));
         for number in SIGNALS {
-            // In this order: the first signal finds the flag down and raises it, the second finds it up.
+            // In this order: the first signal finds the flag unset and sets it, the second finds it set.
             flag::register_conditional_shutdown(number, BY_SIGNAL + number, Arc::clone(&asked))
                 .and_then(|_| flag::register_usize(number, Arc::clone(&signal), number as usize))
                 .and_then(|_| flag::register(number, Arc::clone(&asked)))
@@ -40,17 +40,17 @@ impl Interrupt {
         Ok(Self { asked, signal })
     }
 
-    /// True once the command shall stop.
+    /// True once the command should stop.
     pub fn flag(&self) -> &AtomicBool {
         &self.asked
     }
 
-    /// Whether the command shall stop.
+    /// Whether the command should stop.
     pub fn is_asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 
-    /// The error of a command that stopped; `how` says what is kept and how to resume.
+    /// The error of a stopped command; `how` says what is kept and how to resume.
     pub fn stopped(&self, how: impl Into<String>) -> anyhow::Error {
         Interrupted {
             signal: self.signal.load(Ordering::Relaxed) as i32,
@@ -78,14 +78,14 @@ impl Interrupt {
     }
 }
 
-/// What a command that wrote nothing says.
+/// Message of a command that wrote nothing.
 pub const NOTHING_WRITTEN: &str = "before anything was written; repeat the command to start over";
 
-/// While it lives, Ctrl-C and TERM end the program at once, with a line that says how to resume.
+/// While this value exists, Ctrl-C and TERM end the program at once, with a line that says how to resume.
 #[derive(Debug)]
 pub struct EndsAtOnce(Arc<AtomicBool>);
 
-/// For work that writes nothing before its end. Drop the result before anything is written.
+/// For work that writes nothing before its end. Drop the result before writing anything.
 pub fn ends_at_once(how: &'static str) -> anyhow::Result<EndsAtOnce> {
     let interrupt = Interrupt::listen()?;
     let over = Arc::new(AtomicBool::new(false));

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What a shell adds to a signal's number in an exit status.
+/// Offset that a shell adds to a signal's number in an exit status.
 pub const BY_SIGNAL: i32 = 128;
 
 /// A command was stopped by a signal.
@@ -14,7 +14,7 @@ pub struct Interrupted {
 }
 
 impl Interrupted {
-    /// What the program ends with: 130 after Ctrl-C, 143 after TERM.
+    /// Exit code of the program: 130 after Ctrl-C, 143 after TERM.
     pub fn exit_code(&self) -> u8 {
         u8::try_from(BY_SIGNAL + self.signal).unwrap_or(1)
     }

@@ -1,6 +1,6 @@
-//! The program `ppa`: CT scans in, paired depth images and radiographs out.
+//! The program `ppa`: paired depth images and radiographs from CT scans.
 //!
-//! Parses, calls the libraries, prints. Results go to stdout, everything else to stderr.
+//! Parses arguments, calls the libraries and prints. Results go to stdout, everything else to stderr.
 
 mod allocator;
 mod cluster_report;
@@ -133,7 +133,7 @@ enum Command {
 }
 
 fn run(cli: Cli, program: &Path) -> anyhow::Result<()> {
-    // Started here: where they are first needed, threads that cannot start would end the program.
+    // Started here: if threads cannot be started at first use, the program would abort.
     rayon::ThreadPoolBuilder::new()
         .num_threads(cli.threads.map_or(0, std::num::NonZeroUsize::get))
         .build_global()
@@ -174,10 +174,10 @@ fn run(cli: Cli, program: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Runs the command of a command line, the name of the program first, and returns what the program ends with.
+/// Runs a command line, which starts with the name of the program, and returns the exit code.
 ///
-/// To be called once in a process: the threads and the output are set up by the first command line. `program` is what the jobs
-/// of `ppa submit` start.
+/// To be called once in a process: the first command line sets up the threads and the output. `program` is what the jobs
+/// of `ppa submit` run.
 pub fn run_program(arguments: &[OsString], program: &Path) -> u8 {
     let options = GlobalOptions::of(arguments);
     let mut command = help::command().color(options.color);
@@ -195,7 +195,7 @@ pub fn run_program(arguments: &[OsString], program: &Path) -> u8 {
             stderr::usage(&error)
         }
     };
-    // Nobody may be there any more to read it.
+    // The reader may already have closed stdout.
     let _ = std::io::stdout().flush();
     exit_code
 }

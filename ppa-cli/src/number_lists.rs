@@ -18,12 +18,12 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     finite(text).ok_or_else(|| format!("expected {N} numbers separated by commas"))
 }
 
-/// `X,Y,Z`.
+/// Parses `X,Y,Z`.
 pub fn point(text: &str) -> Result<[f64; 3], String> {
     numbers(text)
 }
 
-/// `X,Y,Z,HEIGHT,SIGMA`: a bump and its place, mm.
+/// Parses `X,Y,Z,HEIGHT,SIGMA`: a bump and its position, mm.
 pub fn bump(text: &str) -> Result<Bump, String> {
     let [x, y, z, height_mm, sigma_mm] = numbers(text)?;
     Ok(Bump {
@@ -33,7 +33,7 @@ pub fn bump(text: &str) -> Result<Bump, String> {
     })
 }
 
-/// `X,Y,Z,RADIUS`, mm.
+/// Parses `X,Y,Z,RADIUS`, mm.
 pub fn ball(text: &str) -> Result<Ball, String> {
     let [x, y, z, radius_mm] = numbers(text)?;
     Ok(Ball {
@@ -42,12 +42,12 @@ pub fn ball(text: &str) -> Result<Ball, String> {
     })
 }
 
-/// `FROM,TO`.
+/// Parses `FROM,TO`.
 pub fn range(text: &str) -> Result<[f64; 2], String> {
     numbers(text)
 }
 
-/// One number for three axes, or three.
+/// Parses one number for all three axes, or three.
 pub fn along_axes(text: &str) -> Result<[f64; 3], String> {
     finite::<1>(text)
         .map(|[number]| [number; 3])
@@ -55,7 +55,7 @@ pub fn along_axes(text: &str) -> Result<[f64; 3], String> {
         .ok_or_else(|| "expected one number, or three separated by commas".to_owned())
 }
 
-/// `FROM,TO` along x, y and z: the smallest and the largest corner.
+/// Parses `FROM,TO` along x, y and z into the smallest and the largest corner.
 pub fn world_box(text: &str) -> Result<[[f64; 3]; 2], String> {
     let [x0, x1, y0, y1, z0, z1] = numbers(text)?;
     let corners = [[x0, y0, z0], [x1, y1, z1]];
@@ -65,7 +65,7 @@ pub fn world_box(text: &str) -> Result<[[f64; 3]; 2], String> {
     Ok(corners)
 }
 
-/// `X,Y,SIZE`: first column, first row, and columns and rows of a square, in pixels.
+/// Parses `X,Y,SIZE`: first column, first row, and side of a square, in pixels.
 pub fn square(text: &str) -> Result<Roi, String> {
     let numbers: Option<Vec<u32>> = text
         .split(',')
@@ -81,7 +81,7 @@ pub fn square(text: &str) -> Result<Roi, String> {
     }
 }
 
-/// First and one past the last index along i, j and k.
+/// Parses first and one past the last index along i, j and k.
 pub fn voxel_box(text: &str) -> Result<VoxelBox, String> {
     let numbers: Option<Vec<usize>> = text
         .split(',')
@@ -96,7 +96,7 @@ pub fn voxel_box(text: &str) -> Result<VoxelBox, String> {
     }
 }
 
-/// `TIBIA,FIBULA,TALUS`: three labels of bones.
+/// Parses `TIBIA,FIBULA,TALUS`: three labels of bones.
 pub fn bone_numbers(text: &str) -> Result<BoneNumbers, String> {
     let numbers: Option<Vec<u8>> = text
         .split(',')

@@ -17,7 +17,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Prints a result: `value` as JSON or the text that `text` makes of it.
+    /// Prints a result: `value` as JSON or the text made by `text`.
     pub fn print<T: Serialize>(
         self,
         value: &T,
@@ -29,14 +29,14 @@ impl Output {
             text(value)
         };
         match writeln!(io::stdout(), "{line}") {
-            // The reader has seen enough, as `head` has.
+            // The reader has closed the pipe, as `head` does.
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
             result => Ok(result?),
         }
     }
 }
 
-/// A step that may take more than a second: says on stderr that it runs.
+/// Shows on stderr that a step which may take more than a second is running.
 pub fn working(what: &str) -> ProgressBar {
     if stderr::is_json() {
         return ProgressBar::hidden();
@@ -61,12 +61,12 @@ pub fn bar(what: &str) -> ProgressBar {
         .with_message(what.to_owned())
 }
 
-/// A number of bytes for people: `1.5 GB`.
+/// Formats a number of bytes: `1.5 GB`.
 pub fn bytes(bytes: u64) -> String {
     indicatif::DecimalBytes(bytes).to_string()
 }
 
-/// Bytes from `800`, `1.5MB`, `20 GB`, `2TB`; units are powers of 1000.
+/// Parses bytes such as `800`, `1.5MB`, `20 GB`, `2TB`; units are powers of 1000.
 pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let wrong = || format!("invalid size {text:?}; expected a number with kB, MB, GB or TB");
     let text = text.trim();
@@ -80,7 +80,7 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
         _ => return Err(wrong()),
     };
     let number: f64 = digits.trim_end().parse().map_err(|_| wrong())?;
-    // f64 counts bytes up to 2^53 exactly.
+    // f64 represents integers up to 2^53 exactly.
     let bytes = number * unit;
     ((1.0..=9e15).contains(&bytes))
         .then_some(bytes as u64)
@@ -100,12 +100,12 @@ pub struct Seconds {
 }
 
 impl Stopwatch {
-    /// Starts now.
+    /// Starts the stopwatch.
     pub fn start() -> Self {
         Self(Instant::now(), ProcessTime::now())
     }
 
-    /// Reads it.
+    /// Seconds since the start.
     pub fn read(&self) -> Seconds {
         Seconds {
             wall_s: self.0.elapsed().as_secs_f64(),

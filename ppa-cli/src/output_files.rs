@@ -12,13 +12,13 @@ use ppa_generate::free_bytes;
 
 use crate::output::bytes as in_words;
 
-/// Endings of meshes, of clouds of points, of pictures, and of volumes without Hounsfield units.
+/// File extensions of meshes, point clouds, pictures, and volumes without Hounsfield units.
 pub const MESH: &[&str] = &[".ply", ".obj", ".stl"];
 pub const CLOUD: &[&str] = &[".ply", ".obj"];
 pub const PICTURE: &[&str] = &[".png"];
 pub const NUMBERS: &[&str] = &[".nii", ".nii.gz", ".nrrd", ".mha", ".mhd"];
 
-/// Written into each folder to see whether the disk takes it, bytes.
+/// Bytes written to each folder to test whether the disk accepts them.
 const PROBE: usize = 4096;
 
 #[derive(Debug, Clone, Copy, Default, Args)]
@@ -29,7 +29,7 @@ pub struct ReplaceArgs {
 }
 
 impl ReplaceArgs {
-    /// Outputs to declare one by one.
+    /// Makes an empty list of outputs to declare.
     pub fn outputs(self) -> OutputFiles {
         OutputFiles {
             replace: self.replace,
@@ -38,7 +38,7 @@ impl ReplaceArgs {
         }
     }
 
-    /// The same, with files replaced as well if `also` is true.
+    /// The same, but files are also replaced if `also` is true.
     pub fn or(self, also: bool) -> Self {
         Self {
             replace: self.replace || also,
@@ -51,30 +51,30 @@ impl ReplaceArgs {
     }
 }
 
-/// The outputs of a command. Each is refused when it is declared: a file that exists without `--replace`, a name with the
-/// wrong ending, a folder that is missing or takes no file, and one file for two outputs.
+/// The outputs of a command. A declaration is refused for an existing file without `--replace`, a name with the wrong
+/// extension, a folder that is missing or not writable, and one file for two outputs.
 #[derive(Debug)]
 pub struct OutputFiles {
     replace: bool,
-    /// The option of each resolved path.
+    /// The option that declared each resolved path.
     declared: HashMap<PathBuf, String>,
-    /// Folders that take files.
+    /// Folders known to be writable.
     tried: Vec<PathBuf>,
 }
 
 impl OutputFiles {
-    /// Outputs of a command that replaces nothing.
+    /// Outputs of a command that never replaces files.
     pub fn new() -> Self {
         ReplaceArgs::default().outputs()
     }
 
-    /// A file in a folder that exists; `endings` are those that it may have, or none if any will do.
+    /// Declares a file in an existing folder; `endings` are the allowed extensions, or empty if any will do.
     pub fn file(&mut self, option: &str, path: &Path, endings: &[&str]) -> anyhow::Result<()> {
         require_folder_of(option, path)?;
         self.file_in_new_folder(option, path, endings)
     }
 
-    /// As [`Self::file`], for writers that create missing folders.
+    /// The same as [`Self::file`], for writers that create missing folders.
     pub fn file_in_new_folder(
         &mut self,
         option: &str,
@@ -102,7 +102,7 @@ impl OutputFiles {
         self.declare(option, path)
     }
 
-    /// A file that was asked for, or none.
+    /// Declares a file if one was asked for.
     pub fn optional(
         &mut self,
         option: &str,
@@ -115,7 +115,7 @@ impl OutputFiles {
         }
     }
 
-    /// A volume: a file, or a new folder of DICOM slices.
+    /// Declares a volume: a file, or a new folder of DICOM slices.
     pub fn volume(&mut self, option: &str, path: &Path) -> anyhow::Result<()> {
         if Format::of_name(path)? == Format::Dicom {
             require_folder_of(option, path)?;
@@ -124,7 +124,7 @@ impl OutputFiles {
         self.file(option, path, NUMBERS)
     }
 
-    /// A folder to fill, which must be new or empty: `--replace` replaces files, never a folder with all that is in it.
+    /// Declares a folder to fill, which must be new or empty: `--replace` replaces files, never a folder with its contents.
     pub fn folder(&mut self, option: &str, path: &Path) -> anyhow::Result<()> {
         let named = format!("{option} {}", path.display());
         if path.is_dir() {
@@ -139,7 +139,7 @@ impl OutputFiles {
                 "{named} exists and is not a folder: choose another name"
             );
         }
-        // `out/` and `out` are one folder.
+        // `out/` and `out` are the same folder.
         let path: PathBuf = path.components().collect();
         self.declare(option, &path)
     }
@@ -161,12 +161,12 @@ impl OutputFiles {
     }
 }
 
-/// Refuses a folder that takes no file; one that is missing must be possible to create.
+/// Refuses a folder that is not writable; a missing one must be possible to create.
 pub fn require_writable(option: &str, folder: &Path) -> anyhow::Result<()> {
     try_folder(folder).with_context(|| format!("cannot write {option} {}", folder.display()))
 }
 
-/// Refuses to write other bytes over a file without `--replace`.
+/// Refuses to overwrite a file with other contents without `--replace`.
 pub fn require_same(path: &Path, bytes: &[u8], replace: ReplaceArgs) -> anyhow::Result<()> {
     let same = replace.is_given() || path.symlink_metadata().is_err() || holds(path, bytes);
     ensure!(
@@ -177,7 +177,7 @@ pub fn require_same(path: &Path, bytes: &[u8], replace: ReplaceArgs) -> anyhow::
     Ok(())
 }
 
-/// Refuses a folder on whose disk `needed` bytes have no room.
+/// Refuses a folder whose disk has no room for `needed` bytes.
 pub fn require_room(folder: &Path, needed: u64) -> anyhow::Result<()> {
     match free_bytes(folder) {
         Some(free) if free < needed => bail!(
@@ -190,7 +190,7 @@ pub fn require_room(folder: &Path, needed: u64) -> anyhow::Result<()> {
     }
 }
 
-/// Bytes of all files below a folder, hidden ones left out, as far as it can be read.
+/// Total size of all files below a folder in bytes, except hidden ones and any that cannot be read.
 pub fn bytes_below(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let seen = entries.filter(|entry| !entry.file_name().as_encoded_bytes().starts_with(b"."));
@@ -202,7 +202,7 @@ pub fn bytes_below(folder: &Path) -> u64 {
     seen.map(size).sum()
 }
 
-/// Whether a file holds these bytes: to write them again replaces nothing.
+/// Whether a file has these contents, so that writing it again replaces nothing.
 fn holds(path: &Path, bytes: &[u8]) -> bool {
     let size = path.metadata().map(|found| found.len());
     size.is_ok_and(|size| size == bytes.len() as u64)
@@ -227,7 +227,7 @@ fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// Writes a file without a name into a folder, or into the nearest one above it that exists.
+/// Writes an unnamed file to a folder, or to its nearest existing parent.
 fn try_folder(folder: &Path) -> io::Result<()> {
     let whole = std::path::absolute(folder)?;
     let nearest = whole.ancestors().find(|path| path.exists());
@@ -256,7 +256,7 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     endings.is_empty() || endings.iter().any(ends)
 }
 
-/// `.ply, .obj or .stl`.
+/// Joins extensions as `.ply, .obj or .stl`.
 fn listed(endings: &[&str]) -> String {
     match endings {
         [others @ .., last] if !others.is_empty() => format!("{} or {last}", others.join(", ")),

@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::output::{Output, bar};
 use crate::stderr::warning;
 
-/// Time between two lines, when progress is not a bar.
+/// Time between two lines if progress is not shown as a bar.
 const INTERVAL: Duration = Duration::from_secs(10);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -38,7 +38,7 @@ pub struct ProgressArgs {
 }
 
 impl ProgressArgs {
-    /// Starts to show the progress; `what` is one of the units that are counted.
+    /// Starts to show the progress; `what` is the name of the counted unit.
     pub fn watch(&self, what: &'static str, output: Output) -> Watch {
         let style =
             self.progress
@@ -51,13 +51,13 @@ impl ProgressArgs {
     }
 }
 
-/// Progress of one run. Lines are printed at fixed intervals, also while a single unit takes long.
+/// Progress of one run. Lines are printed at fixed intervals, even while a single unit takes long.
 pub struct Watch {
     what: &'static str,
     bar: ProgressBar,
     state: Arc<Mutex<State>>,
     ticker: Mutex<Option<Ticker>>,
-    /// Lines of findings that were repeated already.
+    /// Findings that have already been repeated.
     repeated: Mutex<Vec<String>>,
 }
 
@@ -88,7 +88,7 @@ impl State {
         }
     }
 
-    /// What is left at the rate of this run; what was found complete took no time.
+    /// Remaining time at the rate of this run; units that were already complete took no time.
     fn remaining(&self, now: Instant) -> Option<Duration> {
         let left = self.units.saturating_sub(self.found + self.made);
         let each = now.duration_since(self.started).as_secs_f64() / self.made as f64;
@@ -158,7 +158,7 @@ impl Watch {
         }
     }
 
-    /// Counts what a run reports.
+    /// Processes a report of the run.
     pub fn report(&self, progress: Progress) {
         if let Progress::Findings(findings) = progress {
             let mut repeated = self.repeated.lock().unwrap_or_else(|e| e.into_inner());
@@ -186,7 +186,7 @@ impl Watch {
         self.bar.set_message(format!("{}s{left}", self.what));
     }
 
-    /// States how far a stopped run came, and how to resume it.
+    /// Describes how far a stopped run came, and how to resume it.
     pub fn how_to_resume(&self) -> String {
         let state = locked(&self.state);
         format!(
@@ -204,7 +204,7 @@ impl Watch {
     }
 }
 
-/// A thread that does something at fixed intervals until it is dropped.
+/// A thread that performs an action at fixed intervals until it is dropped.
 struct Ticker {
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,

@@ -5,28 +5,28 @@ use std::env;
 use anyhow::{Context, bail};
 use ppa_core::Part;
 
-/// Where a shard was named.
+/// A shard and what named it.
 struct Named {
     part: Part,
     by: &'static str,
 }
 
-/// Which shard of a plan a process is to make.
+/// The shard of a plan that a process is to make.
 #[derive(Debug)]
 pub enum ShardRequest {
-    /// This one.
+    /// This shard.
     Part(Part),
-    /// That of one task of a Slurm array which is not all of the array, as when a task is run again.
+    /// The shard of a task in a Slurm array that does not cover all shards, as when a task is run again.
     Task {
         /// Number of the task.
         id: u64,
-        /// What the environment says of it.
+        /// Description of the task in the environment.
         named: String,
     },
 }
 
 impl ShardRequest {
-    /// The part; `held` is that of the folder it goes into, where one was begun.
+    /// Returns the part; `held` is that of its output folder, if the folder was started.
     pub fn part(
         &self,
         held: impl FnOnce() -> anyhow::Result<Option<Part>>,
@@ -51,7 +51,7 @@ impl ShardRequest {
 
 /// The shard of `--shard`, of a Slurm job array or job step, of `mpirun`, or of an indexed Kubernetes job.
 ///
-/// Two that disagree are an error: half of a plan would be made twice, or not at all.
+/// Two that disagree are an error: otherwise half of a plan could be made twice, or not at all.
 pub fn shard(option: Option<Part>) -> anyhow::Result<ShardRequest> {
     shard_named(option, &|name| env::var(name).ok())
 }
@@ -97,8 +97,8 @@ fn shard_named(
             && (first..=last).contains(&id)
             && (id - first) % step == 0
             && (last - first) / step + 1 == count;
-        // A list with gaps leaves it open which shard this is, and a single task or a range that begins later looks like
-        // tasks of a larger array that are run again.
+        // A list with gaps does not determine the shard, and a single task or a range that begins later looks like repeated
+        // tasks of a larger array.
         if even && count > 1 && first <= 1 {
             named.push(part((id - first) / step, count, "SLURM_ARRAY_TASK_ID")?);
         } else {
@@ -108,7 +108,7 @@ fn shard_named(
             task = Some(ShardRequest::Task { id, named });
         }
     }
-    // Processes of mpirun inherit the step of Slurm that started mpirun's daemons, which is not theirs.
+    // Processes of mpirun inherit the Slurm step that started mpirun's daemons, which is not their own.
     if variable("OMPI_COMM_WORLD_RANK").is_none() && variable("SLURM_STEP_ID").is_some() {
         let count = match variable("SLURM_STEP_NUM_TASKS") {
             Some(_) => number("SLURM_STEP_NUM_TASKS")?,
@@ -160,7 +160,7 @@ fn shard_named(
     }
 }
 
-/// From here on Slurm numbers steps that `srun` did not start: batch scripts, interactive steps, external processes.
+/// First number of Slurm steps that `srun` did not start: batch scripts, interactive steps, external processes.
 const FIRST_SPECIAL_STEP: u64 = 0xffff_fff0;
 
 #[cfg(test)]
@@ -171,7 +171,7 @@ mod tests {
         named_in(None, option, variables)
     }
 
-    /// The part for a folder that holds a part already.
+    /// The part for a folder that already holds a part.
     fn named_in(
         held: Option<&str>,
         option: Option<&str>,
@@ -249,7 +249,7 @@ mod tests {
             |rank: u32, id: u64| format!("SLURM_STEP_ID={id} SLURM_PROCID={rank} SLURM_NTASKS=3");
         assert_eq!(named(None, &step(0, 0)), Ok("1/3".into()));
         assert_eq!(named(None, &step(2, 4)), Ok("3/3".into()));
-        // A step of fewer tasks than its job.
+        // A step with fewer tasks than its job.
         let fewer = format!("{} SLURM_STEP_NUM_TASKS=2", step(1, 0));
         assert_eq!(named(None, &fewer), Ok("2/2".into()));
         let one = format!("{} SLURM_STEP_NUM_TASKS=1", step(0, 0));
@@ -260,7 +260,7 @@ mod tests {
             Ok("1/1".into())
         );
         assert_eq!(named(None, &step(0, 0xffff_fffb)), Ok("1/1".into()));
-        // Under mpirun the step is that of its daemons.
+        // Under mpirun the step belongs to its daemons.
         let mpi = format!(
             "{} OMPI_COMM_WORLD_RANK=4 OMPI_COMM_WORLD_SIZE=8",
             step(1, 0)

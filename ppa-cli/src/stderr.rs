@@ -1,4 +1,4 @@
-//! Messages on stderr besides progress: warnings, notes, and the final error.
+//! Messages on stderr other than progress: warnings, notes, and the final error.
 //!
 //! With `--json` each is one line of JSON.
 
@@ -14,22 +14,22 @@ use serde_json::json;
 
 use crate::interrupted::Interrupted;
 
-/// Exit code of a command that failed; clap's own is 2.
+/// Exit code of a failed command; clap uses 2.
 const FAILED: u8 = 1;
 
 static AS_JSON: OnceLock<bool> = OnceLock::new();
 
-/// Global options that are needed before the command line is parsed, as parsing may fail.
+/// Global options needed before the command line is parsed, since parsing may fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GlobalOptions {
     /// Whether `--json` was given.
     pub json: bool,
-    /// The last `--color`; `Auto` without one.
+    /// Value of the last `--color`; `Auto` if there is none.
     pub color: ColorChoice,
 }
 
 impl GlobalOptions {
-    /// Looks for both options among the arguments before `--`.
+    /// Finds both options among the arguments before `--`.
     pub fn of<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Self {
         let mut options = Self {
             json: false,
@@ -56,7 +56,7 @@ impl GlobalOptions {
     }
 }
 
-/// Settles the colours of all output, and whether stderr holds lines of JSON. To be called once, before anything is said.
+/// Sets the colours of all output, and whether stderr gets lines of JSON. To be called once, before any output.
 pub fn set_up(json: bool, color: ColorChoice) {
     let choice = match color {
         ColorChoice::Auto => anstream::ColorChoice::Auto,
@@ -69,17 +69,17 @@ pub fn set_up(json: bool, color: ColorChoice) {
     AS_JSON.get_or_init(|| json);
 }
 
-/// Whether stderr holds lines of JSON.
+/// Whether stderr gets lines of JSON.
 pub fn is_json() -> bool {
     AS_JSON.get().copied().unwrap_or(false)
 }
 
-/// Says something that may make a result wrong or incomplete.
+/// Prints a warning about something that may make a result wrong or incomplete.
 pub fn warning(text: &str) {
     say("warning", AnsiColor::Yellow.on_default().bold(), text);
 }
 
-/// Says something worth knowing.
+/// Prints a note.
 pub fn note(text: &str) {
     say("note", Style::new(), text);
 }
@@ -92,7 +92,7 @@ fn say(kind: &str, style: Style, text: &str) {
     }
 }
 
-/// The error that ends the program, as `--json` prints it.
+/// The final error in the form that `--json` prints.
 #[derive(Debug, PartialEq, Serialize)]
 struct Failure {
     error: String,
@@ -100,7 +100,7 @@ struct Failure {
     exit_code: u8,
 }
 
-/// Says why a command failed or was stopped, and what the program ends with.
+/// Prints why a command failed or was stopped, and returns the exit code.
 pub fn failure(error: &anyhow::Error) -> u8 {
     let stopped = error.downcast_ref::<Interrupted>();
     let exit_code = stopped.map_or(FAILED, Interrupted::exit_code);
@@ -118,7 +118,7 @@ pub fn failure(error: &anyhow::Error) -> u8 {
     exit_code
 }
 
-/// Says why the command line cannot be used, or prints the help or version it asks for.
+/// Prints why the command line is invalid, or the help or version it asks for, and returns the exit code.
 pub fn usage(error: &clap::Error) -> u8 {
     let exit_code = u8::try_from(error.exit_code()).unwrap_or(FAILED);
     if is_json() && error.use_stderr() {
@@ -128,7 +128,7 @@ pub fn usage(error: &clap::Error) -> u8 {
             exit_code,
         });
     } else {
-        // Nobody may be there any more to read the help, as after `ppa --help | head`.
+        // The reader may have closed the pipe, as after `ppa --help | head`.
         let _ = error.print();
     }
     exit_code

@@ -1,4 +1,4 @@
-//! Random numbers addressed by (seed, stream, index), and a file that appears whole or not at all.
+//! Random numbers addressed by (seed, stream, index), and a file that is written completely or not at all.
 //!
 //! `cargo run -p ppa-core --example addressed_random`
 
@@ -9,7 +9,7 @@ use ppa_core::random::Philox;
 use ppa_core::{regular_file, whole_file};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Whatever the order in which items are visited, item 7 of stream 0 gets the same numbers.
+    // Item 7 of stream 0 gets the same numbers in whatever order the items are visited.
     let (seed, stream) = (42, 0);
     let mut table = String::new();
     for index in (0..10).rev() {

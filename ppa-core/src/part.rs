@@ -22,12 +22,12 @@ impl Part {
     /// The only part of a run.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// Its number, counted from 1.
+    /// Number of the part, counted from 1.
     pub fn index(&self) -> u64 {
         self.index
     }
 
-    /// Its share of `total` items; the parts of one run follow each other without gap.
+    /// Returns the part's share of `total` items; consecutive parts follow each other without gaps.
     pub fn share(&self, total: u64) -> Range<u64> {
         let bound =
             |index: u64| (u128::from(total) * u128::from(index) / u128::from(self.count)) as u64;

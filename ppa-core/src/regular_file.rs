@@ -7,10 +7,10 @@ use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Something other than a regular file.
+/// Error for a path that is not a regular file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotRegular {
-    /// What the path names, such as `a named pipe`.
+    /// Kind of file found, such as `a named pipe`.
     pub found: &'static str,
 }
 
@@ -29,18 +29,18 @@ impl std::error::Error for NotRegular {}
 /// [`io::ErrorKind::InvalidInput`] for pipes, devices and sockets.
 pub fn open(path: impl AsRef<Path>) -> io::Result<File> {
     let path = path.as_ref();
-    // Looked at first: opening alone wakes the writer of a pipe and can rewind a tape.
+    // Checked first: opening alone wakes the writer of a pipe and can rewind a tape.
     expect_regular(&std::fs::metadata(path)?)?;
     let file = without_blocking().open(path)?;
-    // What lies there may have been exchanged in between.
+    // The file may have been replaced in between.
     expect_regular(&file.metadata()?)?;
     Ok(file)
 }
 
-/// All bytes of a regular file.
+/// Reads all bytes of a regular file.
 ///
 /// # Errors
-/// As [`open`], and [`io::ErrorKind::OutOfMemory`] where memory does not hold it.
+/// The same as [`open`], and [`io::ErrorKind::OutOfMemory`] if the bytes do not fit in memory.
 pub fn read(path: impl AsRef<Path>) -> io::Result<Vec<u8>> {
     let mut file = open(path)?;
     let mut bytes = Vec::new();
@@ -49,10 +49,10 @@ pub fn read(path: impl AsRef<Path>) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A regular file of UTF-8 text.
+/// Reads a regular file of UTF-8 text.
 ///
 /// # Errors
-/// As [`read`], and [`io::ErrorKind::InvalidData`] for other text.
+/// The same as [`read`], and [`io::ErrorKind::InvalidData`] for other text.
 pub fn read_to_string(path: impl AsRef<Path>) -> io::Result<String> {
     let mut file = open(path)?;
     let mut text = String::new();

@@ -11,6 +11,6 @@ pub struct Roi {
     pub x_start: u32,
     /// First row.
     pub y_start: u32,
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub size: u32,
 }

@@ -5,13 +5,13 @@ use std::{fs, io};
 
 use sha2::{Digest, Sha256};
 
-/// The first eight bytes, in hexadecimal, of a SHA-256 over the names and contents of all files at or below some paths; missing
-/// paths are left out.
+/// Returns the first eight bytes, in hexadecimal, of a SHA-256 over the names and contents of all files at or below the given paths;
+/// missing paths are skipped.
 ///
 /// Tells Cargo to run the build script again when one of them changes.
 ///
 /// # Errors
-/// What the system said of a file that cannot be read.
+/// The system's error for a file that cannot be read.
 pub fn source_hash(roots: &[PathBuf]) -> io::Result<String> {
     let mut hasher = Sha256::new();
     for root in roots.iter().filter(|root| root.exists()) {
@@ -28,7 +28,7 @@ pub fn source_hash(roots: &[PathBuf]) -> io::Result<String> {
     Ok(bytes[..8].iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// All files at or below a path, in the order of their names.
+/// Lists all files at or below a path, sorted by name.
 fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
     if path.is_file() {
         return Ok(vec![path.to_owned()]);

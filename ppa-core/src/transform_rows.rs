@@ -1,9 +1,9 @@
 //! Rigid transforms as rows of numbers in files.
 
-/// A rigid transform as files hold it: the rows of its 4 x 4 matrix, the last of them `0 0 0 1`, lengths in mm.
+/// A rigid transform as stored in files: the rows of its 4 x 4 matrix, the last of them `0 0 0 1`, lengths in mm.
 pub type TransformRows = [[f64; 4]; 4];
 
-/// Largest deviation of RᵀR from the identity that is read as rounding in a file.
+/// Largest deviation of RᵀR from the identity that is accepted as rounding in a file.
 const ORTHOGONALITY: f64 = 1e-4;
 
 /// Why a 4x4 matrix is not a rigid motion.
@@ -35,15 +35,15 @@ pub enum RigidError {
     NotOrthonormal {
         /// Largest entry of |RᵀR − 1|.
         deviation: f64,
-        /// What is accepted.
+        /// Largest accepted deviation.
         limit: f64,
     },
-    /// The upper left block mirrors.
+    /// The upper left block is a reflection.
     #[error("the 4x4 matrix is a reflection (determinant −1), expected a rotation")]
     Mirror,
 }
 
-/// Accepts the rows of a rigid motion, with rounding up to 1e-4 in RᵀR, as of matrices printed with five decimals.
+/// Checks that rows form a rigid motion; accepts rounding up to 1e-4 in RᵀR, as of matrices printed with five decimals.
 ///
 /// # Errors
 /// [`RigidError`] names the entry or the deviation.

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which of the two depth cameras on the tube housing.
+/// One of the two depth cameras on the tube housing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum View {
-    /// The paper's V1.
+    /// V1 in the paper.
     #[serde(rename = "cam_left")]
     Left,
-    /// The paper's V2.
+    /// V2 in the paper.
     #[serde(rename = "cam_right")]
     Right,
 }

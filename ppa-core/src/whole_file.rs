@@ -1,11 +1,11 @@
-//! Files that appear complete or not at all.
+//! Files that are written completely or not at all.
 
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use atomic_write_file::AtomicWriteFile;
 
-/// A file under construction beside its final path.
+/// A file being written next to its final path.
 #[derive(Debug)]
 pub struct Unfinished(BufWriter<AtomicWriteFile>);
 
@@ -25,8 +25,7 @@ impl Seek for Unfinished {
     }
 }
 
-/// Lets `fill` write a temporary file beside `path`, which is then synced and renamed. Another file at `path` stays valid
-/// until then.
+/// Lets `fill` write a temporary file next to `path`, which is then synced and renamed. Until then, a previous file at `path` stays valid.
 ///
 /// # Errors
 /// [`io::Error`] of the system or of `fill`; [`io::ErrorKind::IsADirectory`] for a folder. Nothing is left behind.
@@ -44,10 +43,10 @@ pub fn write_with(
     file.0.into_inner().map_err(io::Error::from)?.commit()
 }
 
-/// [`write_with`] bytes that are there already.
+/// The same as [`write_with`] for bytes already in memory.
 ///
 /// # Errors
-/// As [`write_with`].
+/// The same as [`write_with`].
 pub fn write(path: impl AsRef<Path>, bytes: &[u8]) -> io::Result<()> {
     write_with(path, |file| file.write_all(bytes))
 }

@@ -1,6 +1,6 @@
-//! Reading DICOM: slices of 512 x 512 pixels as they are, and real series in every compressed encoding.
+//! Reading DICOM: uncompressed slices of 512 x 512 pixels, and real series in every compressed encoding.
 //!
-//! The compressed ones lie in the shared data beside the repository; without them only the first is measured.
+//! The compressed series are in the shared data next to the repository; without them only the first is measured.
 
 #[path = "../tests/it/series.rs"]
 mod series;

@@ -54,7 +54,7 @@ fn reading(c: &mut Criterion) {
     let slices = folder.path().join("slices");
     group.bench_function("write_dicom_64_slices", |b| {
         b.iter(|| {
-            // A folder that holds something is left alone.
+            // A folder that is not empty is never overwritten.
             let _ = std::fs::remove_dir_all(&slices);
             write(&slices, &volume)
         })

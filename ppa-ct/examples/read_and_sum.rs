@@ -1,6 +1,6 @@
 //! Reads a scan, sums its voxels, and prints both times: `cargo run --release -p ppa-ct --example read_and_sum -- PATH`.
 //!
-//! `benches/peers/dicom_reading.py` runs it beside SimpleITK and pydicom.
+//! `benches/peers/dicom_reading.py` compares it with SimpleITK and pydicom.
 
 use std::path::Path;
 use std::time::Instant;

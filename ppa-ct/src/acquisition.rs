@@ -1,25 +1,25 @@
-//! Facts about the acquisition that a file states beyond geometry and values, for the audit.
+//! Facts about the acquisition that a file states in addition to geometry and values, for the audit.
 
 use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-/// Facts a reader hands over. Whatever the format cannot say is `None`, empty or 0.
+/// Facts from a reader. Whatever the format does not state is `None`, empty or 0.
 ///
-/// Of identifying attributes only the names pass on, never a value.
+/// Only the names of identifying attributes are kept, never a value.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Acquisition {
-    /// Slice Thickness in mm, where all slices agree.
+    /// Slice Thickness in mm, if it is the same in all slices.
     pub slice_thickness_mm: Option<f64>,
-    /// How the patient lay in the scanner (DICOM Patient Position), e.g. `FFS`: feet first, supine.
+    /// Position of the patient in the scanner (DICOM Patient Position), e.g. `FFS`: feet first, supine.
     pub patient_position: Option<String>,
-    /// Table Height in mm, where all slices agree.
+    /// Table Height in mm, if it is the same in all slices.
     pub table_height_mm: Option<f64>,
     /// Smallest and largest HU that the stored numbers can express in every slice.
     pub representable_hu: Option<[f64; 2]>,
-    /// Unit of the values, where the source says that they are no HU: a term of DICOM or UCUM.
+    /// Unit of the values, a DICOM or UCUM term, if the source says that they are not HU.
     pub unit: Option<&'static str>,
-    /// The pixels went through a lossy compression.
+    /// Whether the pixels were compressed with loss.
     pub lossy: bool,
     /// Voxels that carried the padding value instead of a measurement.
     pub padded_voxels: usize,
@@ -30,7 +30,7 @@ pub struct Acquisition {
 }
 
 impl Acquisition {
-    /// What holds for a scan as a whole, given what its slices state.
+    /// Returns the facts that hold for a scan, given those of its slices.
     pub fn of_slices<'a>(slices: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut slices = slices.into_iter();
         let Some(first) = slices.next() else {
@@ -54,7 +54,7 @@ impl Acquisition {
     }
 }
 
-/// A length that two sources state alike, to a hundredth of a millimetre.
+/// Returns a length if two sources agree on it to a hundredth of a millimetre.
 fn agreed(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.zip(b)
         .and_then(|(a, b)| ((a - b).abs() < 0.01).then_some(a))

@@ -1,9 +1,9 @@
 //! Import audit: geometry, values and content of a scan, and their consequences for the images made from it.
 //!
-//! [`Audit::of`] looks at geometry, values, what the field of view cuts off, metal, couch and
-//! identifiers, and turns what the reader noticed into the same form. Spatial checks work on means
-//! of about 2 mm in the order of the body's axes (left, posterior, superior), so that noise and
-//! the order of the voxels do not matter.
+//! [`Audit::of`] checks geometry, values, cuts by the field of view, metal, couch and identifiers,
+//! and adds the reader's warnings in the same form. Spatial checks use means over blocks of about
+//! 2 mm ordered along the body's axes (left, posterior, superior), so that noise and the order of
+//! the voxels do not matter.
 
 mod couch;
 mod findings;
@@ -22,33 +22,33 @@ use crate::scan::{Scan, WarningCode};
 use histogram::Histogram;
 use survey::Survey;
 
-/// What a scan shows, and what follows.
+/// Findings about a scan and the measures behind them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Audit {
     /// Most serious first.
     pub findings: Vec<Finding>,
-    /// Numbers that the findings rest on.
+    /// Measures behind the findings.
     pub measures: Measures,
 }
 
 /// Numbers measured on a scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measures {
-    /// Where the voxel axes i, j, k run: letters of the directions L, R, P, A, S, I.
+    /// Directions of the voxel axes i, j, k as letters L, R, P, A, S, I.
     pub axes: String,
     /// Angle between the slice step and the slices' normal, degrees.
     pub tilt_deg: f64,
-    /// HU that most air voxels have; `None` without air.
+    /// Most frequent HU of air; `None` without air.
     pub air_peak_hu: Option<f64>,
-    /// HU that most soft-tissue voxels have; `None` without soft tissue.
+    /// Most frequent HU of soft tissue; `None` without soft tissue.
     pub tissue_peak_hu: Option<f64>,
     /// Volume above 300 HU, cm³: bone and metal.
     pub bone_cm3: f64,
     /// Volume above 2500 HU, cm³.
     pub metal_cm3: f64,
-    /// Tissue in the outermost layers, cm²: where the field of view cuts it.
+    /// Area of tissue in the outermost layers, where the field of view cuts it, cm².
     pub cut_cm2: CutFaces,
-    /// Tissue at the edge of a round field of view, cm².
+    /// Area of tissue at the edge of a round field of view, cm².
     pub cut_by_circle_cm2: f64,
     /// Width of a couch-like plate, mm.
     pub couch_mm: Option<f64>,
@@ -67,7 +67,7 @@ pub struct CutFaces {
 }
 
 impl Audit {
-    /// Looks at a scan; takes about as long as reading it.
+    /// Audits a scan; takes about as long as reading it.
     pub fn of(scan: &Scan) -> Self {
         let volume = &scan.volume;
         let histogram = Histogram::of(volume.values());
@@ -101,7 +101,7 @@ impl Audit {
             ![not_hu, FindingCode::ShiftedValues].contains(&finding.code)
         });
         findings.extend(scale);
-        // What rests on HU says nothing where there are none.
+        // Checks of HU are meaningless for values in other units.
         if hounsfield {
             findings.extend(values::check(
                 &histogram,

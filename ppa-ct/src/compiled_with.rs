@@ -2,8 +2,8 @@
 
 use std::any::TypeId;
 
-/// The compiler's identities of third-party crates that this one is compiled with, for the code key of datasets: each changes with version,
-/// features and profile of its crate and with the compiler, see `ppa-generate/src/compiled.rs`.
+/// Returns the compiler's identities of the third-party crates that this one is compiled with, for the code key of datasets: each changes
+/// with version, features and profile of its crate and with the compiler, see `ppa-generate/src/compiled.rs`.
 pub fn compiled_with() -> Vec<TypeId> {
     vec![
         #[cfg(feature = "dicom")]

@@ -1,11 +1,11 @@
-//! Lattices made from another one: other spacing, right angles, axes in the order of LPS.
+//! Lattices derived from another one: other spacing, right angles, axes in LPS order.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::grid::Grid;
 use crate::volume_error::VolumeError;
 
-/// Most voxels of a lattice to resample to: 16 GiB of values.
+/// Largest number of voxels of a lattice to resample to: 16 GiB of values.
 pub(crate) const MOST_VOXELS: f64 = 4_294_967_296.0;
 
 impl Grid {
@@ -21,12 +21,12 @@ impl Grid {
 
     /// The same box and axes with other spacings along i, j, k.
     ///
-    /// The box is that of whole voxels, not of their centres; its middle stays where it is, and
-    /// each side has as many voxels as come closest to filling it.
+    /// The box encloses whole voxels, not only their centres. Its centre does not move, and each side
+    /// gets the number of voxels that comes closest to filling it.
     ///
     /// # Errors
-    /// [`VolumeError::Spacing`] unless each is a length above 0, [`VolumeError::TooCoarse`] if a side would be left without a voxel,
-    /// [`VolumeError::TooFine`] if they make more than 2^32 voxels.
+    /// [`VolumeError::Spacing`] unless each spacing is above 0, [`VolumeError::TooCoarse`] if an axis would have no voxel left,
+    /// [`VolumeError::TooFine`] for more than 2^32 voxels.
     pub fn with_spacing(&self, spacing_mm: Vector3<f64>) -> Result<Self, VolumeError> {
         if let Some(bad) = spacing_mm.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
             return Err(VolumeError::Spacing(*bad));
@@ -60,7 +60,7 @@ impl Grid {
         )?)
     }
 
-    /// A lattice with right angles in the planes of the slices that holds every voxel centre.
+    /// A lattice with right angles in the slice planes that contains every voxel centre.
     ///
     /// Its i axis is the old one and its k axis the normal of the slices, so that a tilted gantry
     /// only shifts slices within their planes. It is larger than the sheared lattice by the lean.
@@ -108,8 +108,8 @@ impl Grid {
         Ok(Self::from_parts(size, direction, spacing, origin)?)
     }
 
-    /// For each of the directions L, P and S, the voxel axis that runs closest to it and whether
-    /// it runs against it.
+    /// For each of the directions L, P and S, returns the voxel axis closest to it and whether
+    /// that axis points the opposite way.
     pub fn lps_axes(&self) -> [(usize, bool); 3] {
         const ORDERS: [[usize; 3]; 6] = [
             [0, 1, 2],

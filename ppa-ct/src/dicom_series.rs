@@ -35,15 +35,15 @@ use series::Sorted;
 use stack::{Between, Stack};
 use stored::StoredFormat;
 
-/// Reads one series in a folder, or below it when the folder itself has no DICOM image, and of the files that a DICOMDIR
-/// in it names.
+/// Reads one series from a folder, or from its subfolders if the folder itself has no DICOM image, including the files that a
+/// DICOMDIR in it lists.
 pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
     let mut seen = BTreeSet::new();
     let (found, looked_at) = search(folder, &mut seen, options)?;
     assemble(folder, found, looked_at, options)
 }
 
-/// Reads a single file of one or more slices, or the files that a DICOMDIR names.
+/// Reads a single file of one or more slices, or the files that a DICOMDIR lists.
 pub(crate) fn read_file(file: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
     let mut seen = BTreeSet::from([file.to_owned()]);
     let mut found = scan_headers(seen.clone(), options)?;
@@ -58,9 +58,9 @@ pub(crate) fn read_file(file: &Path, options: &ReadOptions) -> Result<Scan, Read
     assemble(file, found, seen.len(), options)
 }
 
-/// What the DICOM files of a folder are, in the order of their names, and how many files there are; where none is an
-/// image, those of its subfolders too, since series are often handed over in a folder of their own beside a licence,
-/// a viewer or a DICOMDIR. Files that were `seen` are left out.
+/// Classifies the DICOM files of a folder, in order of their names, and counts its files. If none is an image, the
+/// subfolders are searched too, since series are often delivered in a folder of their own next to a licence, a viewer
+/// or a DICOMDIR. Files already in `seen` are skipped.
 fn search(
     folder: &Path,
     seen: &mut BTreeSet<PathBuf>,
@@ -99,7 +99,7 @@ fn search(
     Ok((found, files))
 }
 
-/// What the files are that directories among those found name, but for those that were `seen`.
+/// Classifies the files listed by the directories found, except those already in `seen`.
 fn listed(
     found: &[Found],
     seen: &mut BTreeSet<PathBuf>,
@@ -122,7 +122,7 @@ fn listed(
     scan_headers(files, options)
 }
 
-/// Reads all headers in parallel; of several errors, the first file's is reported.
+/// Reads all headers in parallel; if there are several errors, that of the first file is reported.
 fn scan_headers(
     files: impl IntoIterator<Item = PathBuf>,
     options: &ReadOptions,
@@ -131,7 +131,7 @@ fn scan_headers(
     let found = files
         .par_iter()
         .map(|file| header::scan(file, options.force));
-    // Collected before the errors are looked at: which one is first must not depend on threads.
+    // Collected before errors are examined: which one is first must not depend on threads.
     found.collect::<Vec<_>>().into_iter().collect()
 }
 
@@ -180,7 +180,7 @@ fn unusable(path: &Path, source: impl Into<VolumeError>) -> ReadError {
     }
 }
 
-/// What the headers say about the meaning of the values; other units than HU are refused unless forced.
+/// Warnings from the headers about the meaning of the values; other units than HU are refused unless forced.
 fn meaning_warnings(slices: &[Slice], force: bool) -> Result<Vec<Warning>, ReadError> {
     let mut warnings = Vec::new();
     let bare = slices.iter().filter(|s| s.frame.rescale.is_none()).count();
@@ -216,7 +216,7 @@ fn padding_warning(padded: usize, pixels: usize) -> Option<Warning> {
     })
 }
 
-/// Decodes all slices and counts padding, in 16 bits if these hold all values.
+/// Decodes all slices and counts padding, in 16 bits if all values fit.
 fn decode(source: &Path, slices: &[Slice], stack: &Stack) -> Result<(Voxels, usize), ReadError> {
     let whole = |s: &Slice| stored::whole_intercept(s.rescale()).is_some();
     if stack.between().is_none() && slices.iter().all(whole) {
@@ -236,8 +236,8 @@ fn decode(source: &Path, slices: &[Slice], stack: &Stack) -> Result<(Voxels, usi
     Ok((Voxels::F32(hu), padded))
 }
 
-/// Decodes all slices in parallel, each into its place; the first slice's error is reported. `None` where `fill`
-/// finds that the type does not hold the values, else the values and how many of them are padding.
+/// Decodes all slices in parallel, each into its place; the first slice's error is reported. Returns `None` if `fill`
+/// finds values that the type cannot hold, otherwise the values and the number of padded ones.
 fn decode_as<T: Clone + Default + Send>(
     source: &Path,
     slices: &[Slice],
@@ -260,7 +260,7 @@ fn decode_as<T: Clone + Default + Send>(
     Ok(padded.map(|padded| (hu, padded.into_iter().sum())))
 }
 
-/// Slices between those of a stack, mixed linearly.
+/// Interpolates slices linearly between those of a stack.
 fn interpolate(hu: &[f32], pixels: usize, between: &[Between]) -> Result<Vec<f32>, VolumeError> {
     let mut filled = zeros(pixels * between.len())?;
     let places = filled.par_chunks_mut(pixels).zip(between);

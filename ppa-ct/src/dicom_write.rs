@@ -21,17 +21,17 @@ use ct_image::CtSeries;
 /// (slope 1, intercept 0). Others are rounded to the nearest of 65535 levels from the smallest to
 /// the largest value, so a value is off by at most (largest - smallest) / 131068. Positions are decimal strings of 16 characters. A gantry tilt is
 /// kept: each slice has its own position.
-/// A left-handed lattice is written too; readers that sort by position, as ours does, hand it
-/// back with k reversed, and every voxel at its place.
+/// A left-handed lattice is written too; readers that sort by position, as ours does, return it
+/// with k reversed and every voxel at its position.
 ///
-/// Nothing is known about the patient, so nothing is stated. UIDs are derived from the voxels and their positions, so that the same volume gives the
-/// same bytes.
+/// Nothing is known about the patient, so nothing is stated. UIDs are derived from the voxels and their positions, so that equal volumes
+/// give equal bytes.
 ///
-/// The folder must not exist yet, or be empty; it appears whole or not at all.
+/// The folder must not exist yet, or be empty; it is written completely or not at all.
 ///
 /// # Errors
 /// [`WriteError`] for axes i and j more than 0.28 degrees from perpendicular, which readers refuse too, more than 65535 voxels along an
-/// axis, a folder that holds something, and a file system that refuses.
+/// axis, a folder that is not empty, and failures of the file system.
 pub fn write(folder: &Path, volume: &Volume) -> Result<(), WriteError> {
     let series = CtSeries::of(volume)?;
     let exists = || WriteError::Exists {
@@ -53,7 +53,7 @@ pub fn write(folder: &Path, volume: &Volume) -> Result<(), WriteError> {
         .prefix(".ppa-ct-")
         .tempdir_in(parent)
         .map_err(io)?;
-    // A folder in it, since the temporary one itself is closed to other users.
+    // A subfolder, since the temporary folder itself is closed to other users.
     let slices = temporary.path().join("slices");
     fs::create_dir(&slices).map_err(io)?;
     let [_, _, nz] = volume.grid().size();
@@ -78,7 +78,7 @@ pub fn write(folder: &Path, volume: &Volume) -> Result<(), WriteError> {
         })
     })?;
     if taken {
-        // It may have been filled meanwhile.
+        // The folder may have been filled meanwhile.
         fs::remove_dir(folder).map_err(|_| exists())?;
     }
     fs::rename(&slices, folder).map_err(io)

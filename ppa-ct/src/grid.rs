@@ -2,7 +2,7 @@
 
 use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Vector3};
 
-/// Why a lattice cannot be used.
+/// Why a lattice is unusable.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GridError {
@@ -16,15 +16,15 @@ pub enum GridError {
     Outside {
         /// i, j or k.
         axis: char,
-        /// Half-open end of the block along it.
+        /// Half-open end of the block along that axis.
         end: usize,
-        /// Voxels along it.
+        /// Voxels of the volume along that axis.
         voxels: usize,
     },
-    /// More voxels than the machine can count.
+    /// More voxels than the machine's integers can count.
     #[error("a volume of {} x {} x {} voxels, expected at most {most} voxels", .0[0], .0[1], .0[2], most = usize::MAX)]
     TooMany([usize; 3]),
-    /// The axes lie in a plane to rounding, or the affine or its inverse is not finite.
+    /// The axes are in one plane up to rounding, or the affine or its inverse is not finite.
     #[error("the voxel-to-world affine is singular or not finite (determinant {determinant})")]
     Singular {
         /// Determinant of the 3x3 part, mm³.
@@ -32,8 +32,8 @@ pub enum GridError {
     },
 }
 
-/// Smallest volume of a voxel, as a share of the block with the same edges at right angles: what rounding
-/// leaves of axes in one plane is below it, the most sheared lattice in use far above.
+/// Smallest volume of a voxel, as a share of the block with the same edges at right angles: axes in one plane are below
+/// it up to rounding, and the most sheared lattice in practice is far above.
 const LEAST_SHARE: f64 = 1e-6;
 
 /// A regular lattice of voxel centres in the `ct` frame (LPS, mm).
@@ -46,7 +46,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A lattice of `size` voxels (i, j, k) whose centres lie at `ct_from_voxel * (i, j, k)`.
+    /// A lattice of `size` voxels (i, j, k) with centres at `ct_from_voxel * (i, j, k)`.
     ///
     /// # Errors
     /// [`GridError`] when a side is 0, the voxels are too many to count or the affine is singular.
@@ -79,7 +79,7 @@ impl Grid {
     /// An unrotated lattice: axes along LPS, `spacing_mm` apart, first centre at `origin_mm`.
     ///
     /// # Errors
-    /// As [`Grid::new`].
+    /// The same as [`Grid::new`].
     pub fn axis_aligned(
         size: [usize; 3],
         spacing_mm: Vector3<f64>,
@@ -91,7 +91,7 @@ impl Grid {
     /// A lattice from unit axis directions (columns), spacing and first centre.
     ///
     /// # Errors
-    /// As [`Grid::new`].
+    /// The same as [`Grid::new`].
     pub fn from_parts(
         size: [usize; 3],
         direction: Matrix3<f64>,
@@ -118,17 +118,17 @@ impl Grid {
         self.size.iter().product()
     }
 
-    /// Never true: a grid has at least one voxel.
+    /// Always false: a grid has at least one voxel.
     pub fn is_empty(&self) -> bool {
         false
     }
 
-    /// Position of voxel (i, j, k) in the linear order, i fastest.
+    /// Linear index of voxel (i, j, k), i fastest.
     pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {
         i + self.size[0] * (j + self.size[1] * k)
     }
 
-    /// Voxel (i, j, k) at a position of the linear order; the inverse of [`Grid::index`].
+    /// Voxel (i, j, k) at a linear index; the inverse of [`Grid::index`].
     pub fn voxel(&self, index: usize) -> [usize; 3] {
         let [nx, ny, _] = self.size;
         [index % nx, index / nx % ny, index / (nx * ny)]
@@ -176,10 +176,10 @@ impl Grid {
         self.centre([0.0; 3])
     }
 
-    /// The sub-lattice of voxels `low..high` (half-open on every axis), at the same world place.
+    /// The sub-lattice of voxels `low..high` (half-open on every axis), at the same world positions.
     ///
     /// # Errors
-    /// [`GridError::Outside`] when the range leaves the lattice, [`GridError::Empty`] when it is empty.
+    /// [`GridError::Outside`] when the range exceeds the lattice, [`GridError::Empty`] when it is empty.
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, GridError> {
         for ((end, voxels), axis) in high.into_iter().zip(self.size).zip(['i', 'j', 'k']) {
             if end > voxels {
@@ -248,7 +248,7 @@ mod tests {
         Grid::new([2, 2, 2], Affine3::from_matrix_unchecked(matrix))
     }
 
-    /// Rounding leaves a determinant of axes in one plane, 1e200 mm overflow it, 1e-200 mm underflow it.
+    /// Axes in one plane have a determinant from rounding; axes of 1e200 mm overflow it, those of 1e-200 mm underflow it.
     #[test]
     fn axes_without_an_inverse_are_refused_whatever_their_length() {
         let plane = [
@@ -267,7 +267,7 @@ mod tests {
             let grid = of_axes([[bad, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
             assert!(matches!(grid, Err(GridError::Singular { .. })), "{bad}");
         }
-        // Micrometres, and the lean of a gantry far beyond any.
+        // Micrometres, and a tilt far beyond that of any gantry.
         assert!(of_axes([[1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0], [0.0, 1.0, 1e-4]]).is_ok());
     }
 

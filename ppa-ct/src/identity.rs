@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use crate::volume::Volume;
 
 impl Volume {
-    /// SHA-256 over size, affine and values, lower-case hexadecimal: the identity of a scan whatever its file is called.
+    /// SHA-256 over size, affine and values in lower-case hexadecimal, which identifies a scan independently of its file name.
     pub fn sha256(&self) -> String {
         let mut hasher = Sha256::new();
         for side in self.grid().size() {

@@ -20,18 +20,18 @@ pub struct Info {
     pub hu_min: f32,
     /// Largest value.
     pub hu_max: f32,
-    /// Sum over all voxels; exact when the values are whole numbers.
+    /// Sum over all voxels; exact if the values are integers.
     pub hu_sum: f64,
     /// Modality the source declares.
     pub modality: Option<String>,
     /// DICOM series read; empty for other formats.
     pub series: Vec<SeriesSummary>,
-    /// What was odd.
+    /// Warnings of the reader.
     pub warnings: Vec<Warning>,
 }
 
 impl Info {
-    /// The facts about `scan`.
+    /// Collects the facts about `scan`.
     pub fn of(scan: &Scan) -> Self {
         let facts = Self::of_volume(&scan.volume);
         Self {
@@ -42,7 +42,7 @@ impl Info {
         }
     }
 
-    /// The facts about a volume that was not read from a file.
+    /// Collects the facts about a volume that was not read from a file.
     pub fn of_volume(volume: &Volume) -> Self {
         let grid = volume.grid();
         let direction = grid.direction();

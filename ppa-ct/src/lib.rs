@@ -1,14 +1,14 @@
 //! CT volumes in Hounsfield units with a typed voxel-to-world affine.
 //!
-//! [`read`] turns a DICOM series or a NIfTI, NRRD or MetaImage file into a [`Scan`] with a
-//! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] lists its properties and [`audit`] checks whether it is what it is
-//! taken for.
+//! [`read`] reads a DICOM series or a NIfTI, NRRD or MetaImage file as a [`Scan`] with a
+//! [`Volume`], or reports why it cannot; [`write()`] writes one; [`Info`] lists its properties and [`audit`] checks whether it is a
+//! plausible CT.
 //! A [`Volume`] is cropped, resampled ([`Volume::resampled`]) and set upright ([`Volume::upright`]).
 //!
 //! Units: mm, Hounsfield units. Frames: `voxel` (i, j, k; the centre of the first voxel is
 //! (0, 0, 0)) and `ct` (DICOM patient axes LPS: x to the left, y posterior, z superior).
 //! A volume may be sheared (gantry tilt) or left-handed: its affine stays as acquired.
-//! Nothing that names a person, a place or a date passes from a file into these types.
+//! No name of a person or place and no date passes from a file into these types.
 //!
 //! Features (all on by default): `dicom`, `nifti`, `nrrd` and `metaimage` enable the readers and writers, `audit` the findings about a scan. Without
 //! them the crate is geometry only.

@@ -5,13 +5,13 @@ use rayon::prelude::*;
 use crate::values::{Values, with_room, zeros};
 use crate::volume_error::VolumeError;
 
-/// Where a Gaussian is cut off, in standard deviations.
+/// Truncation radius of a Gaussian, in standard deviations.
 const REACH: f64 = 4.0;
 
-/// Width of the Gaussian, in voxels, for samples `step` voxels apart; 0 where none is needed.
+/// Width of the Gaussian, in voxels, for samples `step` voxels apart; 0 if none is needed.
 ///
 /// A variance of (step² − 1)/4 leaves 29 % of a wave at the new Nyquist frequency when the step
-/// is large, 6 % at one and a half times and 0.7 % at twice that frequency; the 1 stands for the
+/// is large, 6 % at one and a half times and 0.7 % at twice that frequency; the 1 accounts for the
 /// blur of the voxels themselves.
 pub(crate) fn sigma_voxels(step: f64) -> f64 {
     // Rounding of an affine must not blur a volume that is not getting coarser.
@@ -21,8 +21,8 @@ pub(crate) fn sigma_voxels(step: f64) -> f64 {
     0.5 * (step * step - 1.0).sqrt()
 }
 
-/// Values (i fastest) blurred by `sigma_voxels` along each axis; beyond the faces the volume is
-/// taken to be mirrored, which keeps its sum.
+/// Blurs values (i fastest) by `sigma_voxels` along each axis; the volume is mirrored at its faces,
+/// which keeps the sum.
 pub(crate) fn low_pass(
     hu: Values,
     size: [usize; 3],
@@ -32,8 +32,8 @@ pub(crate) fn low_pass(
     values.extend(hu.iter());
     for (axis, sigma) in sigma_voxels.into_iter().enumerate() {
         if sigma > 0.0 && size[axis] > 1 {
-            // The mirrored volume repeats after twice its side: a Gaussian that wide leaves 5e-9 of its
-            // longest wave, 2 exp(-2 π² (σ / period)²), and a wider one is no other mean.
+            // The mirrored volume repeats after twice its side: a Gaussian that wide leaves 5e-9 of its longest
+            // wave, 2 exp(-2 π² (σ / period)²), and a wider one does not change the mean.
             let sigma = sigma.min(2.0 * size[axis] as f64);
             values = along(&values, size, axis, &kernel(sigma))?;
         }
@@ -58,7 +58,7 @@ fn along(
 ) -> Result<Vec<f32>, VolumeError> {
     let count = [nx, ny, nz][axis];
     let reach = (kernel.len() / 2) as i64;
-    // Where the places from −reach to count + reach lie in the mirrored volume.
+    // Source indices of the positions from −reach to count + reach in the mirrored volume.
     let sources = (-reach..count as i64 + reach).map(|at| mirrored(at, count));
     let sources = sources.collect::<Vec<_>>();
     let row = |j: usize, k: usize| &values[nx * (j + ny * k)..][..nx];
@@ -97,7 +97,7 @@ fn along(
     Ok(blurred)
 }
 
-/// The voxel that a place outside falls on when the volume is mirrored at its faces.
+/// Index of the voxel at a position outside when the volume is mirrored at its faces.
 fn mirrored(at: i64, count: usize) -> usize {
     let count = count as i64;
     let folded = at.rem_euclid(2 * count);

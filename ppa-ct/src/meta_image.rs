@@ -1,8 +1,8 @@
-//! MetaImage in and out: a text header, then raw or deflated voxels, in the same file (`.mha`) or in a separate one next to it (`.mhd`).
+//! Reading and writing MetaImage: a text header, then raw or deflated voxels, in the same file (`.mha`) or in one next to it (`.mhd`).
 //!
-//! Keys as in the MetaIO documentation and as ITK, which the format comes from, understands them:
+//! Keys are interpreted as in the MetaIO documentation and in ITK, where the format comes from:
 //! the world is LPS, `TransformMatrix` lists the directions of the axes i, j, k one after the other,
-//! `CenterOfRotation` and `AnatomicalOrientation` change nothing.
+//! `CenterOfRotation` and `AnatomicalOrientation` are ignored.
 
 mod header;
 mod write;
@@ -51,7 +51,7 @@ pub(crate) fn read(path: &Path, force: bool) -> Result<Scan, ReadError> {
             data
         }
     };
-    // MetaIO takes both wrappings of a deflate stream.
+    // MetaIO accepts both wrappers of a deflate stream.
     let packing = match packed {
         false => Packing::Raw,
         true if data.next_is(&[0x1f, 0x8b])? => Packing::Gzip,

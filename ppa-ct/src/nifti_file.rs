@@ -1,7 +1,7 @@
-//! NIfTI-1 in and out.
+//! Reading and writing NIfTI-1.
 //!
 //! Header fields as defined in `nifti1.h` of the NIfTI-1 standard. World axes there are RAS
-//! (x right, y anterior); ours are LPS, so both are flipped on the way.
+//! (x right, y anterior) and here LPS, so x and y are flipped on conversion.
 
 mod affine;
 mod write;
@@ -31,11 +31,11 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
     let header = read_header(&mut file)?;
     let size = size(&header).map_err(|p| file.header(p))?;
     let (ct_from_voxel, oriented) = affine::ct_from_voxel(&header).map_err(|p| file.header(p))?;
-    // Checked before the voxels are read: a singular affine needs no decompression.
+    // Checked before the voxels are read: a singular affine is refused without decompression.
     let grid = file.grid(size, ct_from_voxel)?;
     let stored = stored(&header).map_err(|p| file.header(p))?;
     let gap = gap(&header).map_err(|p| file.header(p))?;
-    // Header extensions: comments, DICOM elements, whatever a program likes to keep.
+    // Header extensions: comments, DICOM elements, or any data of other programs.
     let extended = file.skip_filled(gap)?;
     let hu = file.voxels(&stored, size)?;
     let warning = (!oriented).then(|| {
@@ -55,7 +55,7 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
     scan_file::scan(path, grid, hu, None, acquisition, warning)
 }
 
-/// Names of the header's free-text fields that hold something.
+/// Names of the header's free-text fields that are not empty.
 fn free_text(header: &NiftiHeader) -> BTreeSet<&'static str> {
     let fields: [(&'static str, &[u8]); 4] = [
         ("descrip", &header.descrip),
@@ -95,7 +95,7 @@ fn size(header: &NiftiHeader) -> Result<[usize; 3], String> {
     let axes = usize::from(header.dim[0]);
     let dim = &header.dim[1..];
     let three = (3..=7).contains(&axes) && dim[3..axes].iter().all(|&n| n == 1);
-    // The field is signed: above i16::MAX it is a negative number.
+    // The field is signed: values above i16::MAX are negative numbers.
     let positive = dim[..3].iter().all(|&n| (1..=i16::MAX as u16).contains(&n));
     if three && positive {
         return Ok([0, 1, 2].map(|axis| usize::from(dim[axis])));
@@ -106,7 +106,7 @@ fn size(header: &NiftiHeader) -> Result<[usize; 3], String> {
     ))
 }
 
-/// How voxels are stored (`datatype` codes of `nifti1.h`).
+/// Storage format of the voxels (`datatype` codes of `nifti1.h`).
 fn stored(header: &NiftiHeader) -> Result<Stored, String> {
     let number = match header.datatype {
         2 => Number::U8,

@@ -37,7 +37,7 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
             return Err(data.header("fewer lines than `line skip` specifies"));
         }
     }
-    // Lines are skipped in the file, bytes in what it unpacks to.
+    // Lines are skipped in the file, bytes in its unpacked contents.
     let mut data = data.unpacked(packing);
     match byte_skip {
         Skip::Bytes(count) => data.skip(count)?,

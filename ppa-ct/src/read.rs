@@ -8,10 +8,10 @@ use crate::scan::{ReadOptions, Scan, starts_as_dicom};
 /// Reads a CT: a folder with one DICOM series, a single DICOM file, a DICOMDIR, NIfTI (`.nii`, `.nii.gz`),
 /// NRRD (`.nrrd`, `.nhdr`) or MetaImage (`.mha`, `.mhd`).
 ///
-/// As [`read_with`] without any option.
+/// The same as [`read_with`] with default options.
 ///
 /// # Errors
-/// As [`read_with`].
+/// The same as [`read_with`].
 pub fn read(path: &Path) -> Result<Scan, ReadError> {
     read_with(path, &ReadOptions::default())
 }
@@ -24,7 +24,7 @@ pub fn read(path: &Path) -> Result<Scan, ReadError> {
 ///
 /// # Errors
 /// [`ReadError`]: other formats, modalities other than CT, several series, missing slices,
-/// slices in the same place, mixed geometry, damaged files, pixel encodings without a decoder.
+/// slices at the same position, mixed geometry, damaged files, pixel encodings without a decoder.
 pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
     let io = |source| ReadError::Io {
         path: path.to_owned(),
@@ -61,7 +61,7 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> 
     }
 }
 
-/// Formats that are recognised by the name of their file.
+/// Formats recognised by file name.
 enum Format {
     Nifti,
     Nrrd,
@@ -69,7 +69,7 @@ enum Format {
 }
 
 impl Format {
-    /// The format of a file with this name in lower case.
+    /// Returns the format of a file with this lower-case name.
     fn of_name(name: &str) -> Option<Self> {
         let ends_with = |endings: &[&str]| endings.iter().any(|ending| name.ends_with(ending));
         if ends_with(&[".nii", ".nii.gz"]) {
@@ -84,7 +84,7 @@ impl Format {
     }
 }
 
-/// The first file of a folder, by name, that has the name of another format than DICOM.
+/// The first file of a folder, by name, whose name has another format than DICOM.
 fn volume_in(folder: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).ok()?;
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));

@@ -10,14 +10,14 @@ use crate::volume::Volume;
 use crate::volume_error::VolumeError;
 
 impl Volume {
-    /// The volume with axes coarser than `max_spacing_mm` resampled to at most that spacing.
+    /// Returns the volume with axes coarser than `max_spacing_mm` resampled to at most that spacing.
     ///
-    /// The first and the last centre of every axis stay where they are, values between centres
-    /// are interpolated trilinearly, and axes that are fine enough are kept. This adds no information, but avoids the staircase of thick slices.
+    /// The first and the last centre of every axis stay in place, values between centres are interpolated
+    /// trilinearly, and axes that are fine enough are kept. This adds no information, but avoids the staircase of thick slices.
     ///
     /// # Errors
-    /// [`VolumeError::Spacing`] unless `max_spacing_mm` is above 0, [`VolumeError::TooFine`] if it
-    /// makes more than 2^32 voxels, [`VolumeError::Memory`] if they do not fit.
+    /// [`VolumeError::Spacing`] unless `max_spacing_mm` is above 0, [`VolumeError::TooFine`] for more
+    /// than 2^32 voxels, [`VolumeError::Memory`] if they do not fit.
     pub fn refined(&self, max_spacing_mm: f64) -> Result<Self, VolumeError> {
         if max_spacing_mm.is_nan() || max_spacing_mm <= 0.0 {
             return Err(VolumeError::Spacing(max_spacing_mm));
@@ -26,7 +26,7 @@ impl Volume {
         let spacing = self.grid().spacing_mm();
         let fine = [0, 1, 2].map(|axis| {
             let steps = (size[axis] - 1) as f64;
-            // A hair of tolerance keeps an axis that is exactly fine enough.
+            // A small tolerance keeps an axis that is exactly fine enough.
             let needed = (steps * spacing[axis] / max_spacing_mm - 1e-9).ceil();
             (needed.max(steps) as usize).saturating_add(1)
         });
@@ -73,7 +73,7 @@ impl Volume {
     }
 }
 
-/// For each fine sample the two coarse ones around it and the weight of the second.
+/// For each fine sample, the two coarse ones around it and the weight of the second.
 fn weights(
     coarse: usize,
     fine: usize,
@@ -108,7 +108,7 @@ mod tests {
     }
 
     proptest! {
-        /// Trilinear interpolation is exact for linear fields, wherever the voxels lie.
+        /// Trilinear interpolation is exact for linear fields, wherever the voxels are.
         #[test]
         fn a_linear_field_stays_itself(
             size in [1_usize..6, 1..6, 2..6],

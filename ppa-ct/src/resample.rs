@@ -9,10 +9,10 @@ use crate::values::{Values, zeros};
 use crate::volume::Volume;
 use crate::volume_error::VolumeError;
 
-/// How values between voxel centres follow from those around them.
+/// Interpolation of values between voxel centres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolation {
-    /// The value of the nearest centre: for labels. Never blurred, whatever the spacing.
+    /// The value of the nearest centre, for labels. Never blurred, whatever the spacing.
     Nearest,
     /// Trilinear: exact for linear fields, never outside the range of the values.
     Linear,
@@ -21,37 +21,37 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// How far outside the outer faces a place still counts as inside, in voxels: rounding.
+/// Largest distance outside the outer faces that still counts as inside, in voxels: rounding.
 const SLACK: f64 = 1e-6;
-/// A place this close to a centre, in voxels, has exactly its value: lattices that meet stay equal.
+/// Distance in voxels below which a position has exactly the value of the centre, so that coinciding lattices give equal values.
 const ON_A_CENTRE: f64 = 1e-8;
 
 impl Volume {
-    /// The same box with other spacings in mm along i, j, k.
+    /// Returns the same box with other spacings in mm along i, j, k.
     ///
     /// Axes that get coarser are low-passed first, except with [`Interpolation::Nearest`].
     ///
     /// # Errors
-    /// As [`Grid::with_spacing`].
+    /// The same as [`Grid::with_spacing`].
     pub fn resampled(
         &self,
         spacing_mm: Vector3<f64>,
         how: Interpolation,
     ) -> Result<Self, VolumeError> {
         let grid = self.grid().with_spacing(spacing_mm)?;
-        // Every centre lies inside: `outside_hu` is never used.
+        // Every centre is inside: `outside_hu` is never used.
         self.resampled_to(&grid, how, 0.0)
     }
 
-    /// The values at the centres of another lattice, which may be rotated and sheared;
+    /// Returns the values at the centres of another lattice, which may be rotated and sheared;
     /// `outside_hu` beyond the faces of this volume.
     ///
     /// Axes along which the other lattice is coarser are low-passed first, except with
-    /// [`Interpolation::Nearest`]. The result is the same for any number of threads.
+    /// [`Interpolation::Nearest`]. The result does not depend on the number of threads.
     ///
     /// # Errors
     /// [`VolumeError::NotFinite`] when `outside_hu` is needed and not finite, [`VolumeError::Memory`]
-    /// when the lattice has more voxels than fit.
+    /// when the voxels of the lattice do not fit in memory.
     pub fn resampled_to(
         &self,
         grid: &Grid,
@@ -70,13 +70,13 @@ impl Volume {
         interpolated(Values::F32(&blurred), self.grid(), grid, how, outside_hu)
     }
 
-    /// The volume on [`Grid::upright`], a lattice with right angles; `outside_hu` in the corners
-    /// that the sheared one leaves empty. A volume that is not sheared stays as it is.
+    /// Returns the volume on [`Grid::upright`], a lattice with right angles; `outside_hu` in the corners
+    /// that the sheared one leaves empty. A volume that is not sheared is returned unchanged.
     ///
-    /// Slices are only shifted within their planes, not made coarser: nothing is low-passed.
+    /// Slices are only shifted within their planes, not made coarser: no low-pass is applied.
     ///
     /// # Errors
-    /// As [`Grid::upright`]; [`VolumeError::NotFinite`] when `outside_hu` is needed and no number.
+    /// The same as [`Grid::upright`]; [`VolumeError::NotFinite`] when `outside_hu` is needed and not finite.
     pub fn upright(&self, how: Interpolation, outside_hu: f32) -> Result<Self, VolumeError> {
         /// Leans below this are rounding in the header: a millimetre in 10 m.
         const RIGHT_ANGLE: f64 = 1e-4;
@@ -90,12 +90,12 @@ impl Volume {
     }
 }
 
-/// Voxel indices of `here` from those of `there`.
+/// Transform to voxel indices of `here` from those of `there`.
 fn here_from_there(here: &Grid, there: &Grid) -> Matrix4<f64> {
     here.voxel_from_ct().matrix() * there.ct_from_voxel().matrix()
 }
 
-/// Values on a lattice at the centres of another one.
+/// Interpolates values of a lattice at the centres of another one.
 fn interpolated(
     hu: Values,
     here: &Grid,
@@ -113,7 +113,7 @@ fn interpolated(
     Volume::new(there.clone(), hu)
 }
 
-/// The values to look up.
+/// The values to interpolate.
 struct Source<'a> {
     hu: Values<'a>,
     size: [usize; 3],
@@ -183,7 +183,7 @@ fn linear_taps(place: f64, count: usize) -> Taps<2> {
     [(base, 1.0 - t), ((base + 1).min(count - 1), t)]
 }
 
-/// Weights of the four nearest centres; beyond the ends values continue in a straight line.
+/// Weights of the four nearest centres; beyond the ends values are extrapolated linearly.
 fn cubic_taps(place: f64, count: usize) -> Taps<4> {
     let base = (place as usize).min(count.saturating_sub(2));
     let t = place - base as f64;

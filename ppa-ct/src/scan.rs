@@ -1,4 +1,4 @@
-//! A scan as read: the volume and its warnings.
+//! A scan as read: the volume, facts about its source and warnings.
 
 use std::path::Path;
 
@@ -7,20 +7,20 @@ use serde::Serialize;
 use crate::acquisition::Acquisition;
 use crate::volume::Volume;
 
-/// One CT, as read from disk.
+/// One CT as read from disk.
 ///
-/// Holds no name, date, description or UID of its source: there is no field for any.
+/// Has no field for a name, date, description or UID of its source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
     /// Hounsfield units in the `ct` frame.
     pub volume: Volume,
-    /// Modality the source declares (`CT`); `None` for NIfTI and NRRD, which cannot say.
+    /// Modality the source declares (`CT`); `None` for NIfTI and NRRD, which cannot declare one.
     pub modality: Option<String>,
     /// All DICOM series found, of which one was read; empty for other formats.
     pub series: Vec<SeriesSummary>,
-    /// What the source states about its acquisition.
+    /// The source's statements about its acquisition.
     pub acquisition: Acquisition,
-    /// Oddities that did not prevent reading.
+    /// Problems that did not prevent reading.
     pub warnings: Vec<Warning>,
 }
 
@@ -37,17 +37,17 @@ pub struct SeriesSummary {
     pub size: [usize; 2],
     /// Whether this is the series that was read.
     pub read: bool,
-    /// Why it cannot be read, if one of its images is not a slice of a CT: in colour, or without a place.
+    /// Why it cannot be read, if one of its images is not a slice of a CT: in colour, or without a position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
 }
 
-/// What to read, and what to let pass.
+/// Options for reading: which series, and what to accept.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ReadOptions {
-    /// Which DICOM series, where there are several.
+    /// The DICOM series to read, if there are several.
     pub series: Option<SeriesChoice>,
-    /// Fills gaps between DICOM slices by linear interpolation, and says so, instead of refusing the series.
+    /// Fills gaps between DICOM slices by linear interpolation, with a warning, instead of refusing the series.
     pub fill_gaps: bool,
     /// Reads modalities other than CT and values in other units than HU, instead of refusing them.
     pub force: bool,
@@ -65,7 +65,7 @@ pub enum SeriesChoice {
 impl std::str::FromStr for SeriesChoice {
     type Err = &'static str;
 
-    /// A whole number is a Series Number, anything of digits and points a UID.
+    /// Parses an integer as a Series Number, and digits and points as a UID.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let is_uid = !text.is_empty() && text.chars().all(|c| c.is_ascii_digit() || c == '.');
         match text.parse() {
@@ -76,7 +76,7 @@ impl std::str::FromStr for SeriesChoice {
     }
 }
 
-/// Something about a scan that a user should know.
+/// A warning for the user about a scan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Warning {
     /// Stable code for scripts.
@@ -96,21 +96,21 @@ pub enum WarningCode {
     SingleSlice,
     /// Localizers (scout views) were left out.
     LocalizersDropped,
-    /// DICOM objects that are no images were left out.
+    /// DICOM objects that are not images were left out.
     NonImagesDropped,
-    /// A DICOMDIR names files that are not there.
+    /// A DICOMDIR lists files that do not exist.
     FilesMissing,
     /// No rescale slope and intercept: stored values are taken as HU.
     NoRescale,
-    /// The values do not look like Hounsfield units, or were said to be none.
+    /// The values do not look like Hounsfield units, or are stated to be something else.
     NotHu,
-    /// Another modality than CT was read as asked for.
+    /// Another modality than CT was read because the options asked for it.
     NotCt,
-    /// Pixels that hold no measurement became air.
+    /// Pixels without a measurement were set to air.
     PixelPadding,
-    /// Slices were interpolated, as asked for.
+    /// Slices were interpolated because the options asked for it.
     GapsFilled,
-    /// The header of a file gives no orientation or no position; the warning says what is assumed.
+    /// The header of a file states no orientation or no position; the warning says what is assumed.
     NoOrientation,
 }
 
@@ -124,7 +124,7 @@ pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
     Ok(start.get(128..) == Some(b"DICM"))
 }
 
-/// Warns when no voxel is near air: every scan of a limb shows some.
+/// Warns if no voxel is near air: every scan of a limb contains some.
 #[cfg(any(
     feature = "dicom",
     feature = "nifti",
@@ -132,7 +132,7 @@ pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
     feature = "metaimage"
 ))]
 pub(crate) fn hu_plausibility(volume: &Volume) -> Option<Warning> {
-    /// Fat is about −100 HU and lung −850: above this, nothing in the volume is air.
+    /// Fat is about −100 HU and lung −850: if all values are above this, the volume has no air.
     const NO_AIR_HU: f32 = -200.0;
     let (min, max) = volume.values().range();
     let window = if min >= 0.0 && max <= 255.0 {

@@ -1,4 +1,4 @@
-//! A file that holds a scan: its bytes from the first to the last, and errors that name it.
+//! Sequential reading of a scan file, with errors that name it.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::mem;
@@ -16,13 +16,13 @@ use crate::values::Voxels;
 use crate::volume::Volume;
 use crate::volume_error::VolumeError;
 
-/// Most bytes that one byte of a deflate stream can unpack to (zlib's technical notes: 1032:1).
+/// Largest number of bytes that one byte of a deflate stream can unpack to (zlib's technical notes: 1032:1).
 const DEFLATE_MOST: u64 = 1032;
 
 /// Longest line of a text header.
 const LINE_BYTES: u64 = 1 << 16;
 
-/// How the bytes from here on are packed.
+/// Packing of the remaining bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Packing {
     Raw,
@@ -30,7 +30,7 @@ pub(crate) enum Packing {
     Zlib,
 }
 
-/// Whether a file is a link that leads out of the folder it lies in.
+/// Whether a file is a link to a place outside its folder.
 fn leads_out(path: &Path) -> io::Result<bool> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
@@ -39,11 +39,11 @@ fn leads_out(path: &Path) -> io::Result<bool> {
     Ok(!path.canonicalize()?.starts_with(folder.canonicalize()?))
 }
 
-/// A file being read from front to back.
+/// A file read from front to back.
 pub(crate) struct ScanFile {
     path: PathBuf,
     stream: Box<dyn BufRead>,
-    /// Bytes still to come; an upper bound where they are packed.
+    /// Remaining bytes; an upper bound if they are packed.
     most: u64,
     packed: bool,
 }
@@ -67,7 +67,7 @@ impl ScanFile {
         })
     }
 
-    /// The file that a header names as the place of its voxels; it must lie beside the header.
+    /// Opens the data file that a header names; it must be next to the header.
     pub(crate) fn open_beside(&self, name: &str) -> Result<Self, ReadError> {
         let path = Path::new(name);
         let mut parts = path.components();
@@ -92,7 +92,7 @@ impl ScanFile {
         Self::open(&path)
     }
 
-    /// What is wrong with the header.
+    /// Error about the header.
     pub(crate) fn header(&self, problem: impl Into<String>) -> ReadError {
         ReadError::Header {
             path: self.path.clone(),
@@ -114,14 +114,14 @@ impl ScanFile {
         }
     }
 
-    /// The lattice of a header.
+    /// Makes the lattice of a header.
     pub(crate) fn grid(&self, size: [usize; 3], affine: Affine3<f64>) -> Result<Grid, ReadError> {
         Grid::new(size, affine).map_err(|e| self.unusable(e))
     }
 
-    /// Whether the next bytes are these; nothing is consumed.
+    /// Whether the next bytes are these; consumes nothing.
     pub(crate) fn next_is(&mut self, bytes: &[u8]) -> Result<bool, ReadError> {
-        // What is buffered may be a single byte: the bytes are taken out and put in front again.
+        // The buffer may hold a single byte: the bytes are taken out and put back in front.
         let next = self.bytes(bytes.len())?;
         let found = next == bytes;
         self.most += next.len() as u64;
@@ -130,7 +130,7 @@ impl ScanFile {
         Ok(found)
     }
 
-    /// Up to `count` bytes, fewer where the file ends.
+    /// Reads up to `count` bytes, fewer if the file ends.
     pub(crate) fn bytes(&mut self, count: usize) -> Result<Vec<u8>, ReadError> {
         let mut bytes = Vec::new();
         (&mut self.stream)
@@ -141,7 +141,7 @@ impl ScanFile {
         Ok(bytes)
     }
 
-    /// The next line with its line feed, which is missing where the file ends before it.
+    /// Reads the next line with its line feed, which is missing if the file ends before it.
     pub(crate) fn line(&mut self) -> Result<String, ReadError> {
         let mut line = Vec::new();
         (&mut self.stream)
@@ -152,14 +152,14 @@ impl ScanFile {
         Ok(String::from_utf8_lossy(&line).into_owned())
     }
 
-    /// Leaves out `count` bytes.
+    /// Skips `count` bytes.
     pub(crate) fn skip(&mut self, count: u64) -> Result<(), ReadError> {
         io::copy(&mut (&mut self.stream).take(count), &mut io::sink()).map_err(|e| self.io(e))?;
         self.most = self.most.saturating_sub(count);
         Ok(())
     }
 
-    /// Leaves out `count` bytes; returns whether any of them is not 0.
+    /// Skips `count` bytes; returns whether any of them is not 0.
     pub(crate) fn skip_filled(&mut self, count: u64) -> Result<bool, ReadError> {
         let (mut left, mut filled) = (count, false);
         while left > 0 {
@@ -173,12 +173,12 @@ impl ScanFile {
         Ok(filled)
     }
 
-    /// Leaves out all but the last `count` bytes of a file that is not packed.
+    /// Skips all but the last `count` bytes of a file that is not packed.
     pub(crate) fn skip_to_last(&mut self, count: u64) -> Result<(), ReadError> {
         self.skip(self.most.saturating_sub(count))
     }
 
-    /// The bytes from here on, unpacked.
+    /// Unpacks the bytes from here on.
     pub(crate) fn unpacked(self, packing: Packing) -> Self {
         let unpacker: Box<dyn Read> = match packing {
             Packing::Raw => return self,
@@ -193,10 +193,10 @@ impl ScanFile {
         }
     }
 
-    /// The voxels, which fill the file from here to its end.
+    /// Reads the voxels, which fill the file from here to its end.
     ///
-    /// Memory: two bytes per voxel, or four and for a moment six where 16 bits do not hold all, asked for only
-    /// if the file can hold them all. So one byte of a file costs at most six, or 6 x 1032 where it is deflated.
+    /// Memory: two bytes per voxel, or four and briefly six if they do not all fit in 16 bits, reserved only if the
+    /// file can contain them all. So one byte of a file costs at most six, or 6 x 1032 if it is deflated.
     pub(crate) fn voxels(mut self, stored: &Stored, size: [usize; 3]) -> Result<Voxels, ReadError> {
         let expected = stored.bytes_of(size).unwrap_or(u64::MAX);
         let wrong = |path: &Path, found| ReadError::PixelCount {
@@ -218,7 +218,7 @@ impl ScanFile {
         let hu = stored
             .read(&mut self.stream, voxels)
             .map_err(|e| self.io(e))?;
-        // To the very end: only there are checksums compared.
+        // Read to the very end, where checksums are compared.
         let surplus = io::copy(&mut self.stream, &mut io::sink()).map_err(|e| self.io(e))?;
         let found = hu.values().len();
         if found != voxels || surplus > 0 {
@@ -228,7 +228,7 @@ impl ScanFile {
     }
 }
 
-/// A scan from the file `path` that a header and its voxels make up.
+/// Makes a scan of the file `path` from its header and voxels.
 pub(crate) fn scan(
     path: &Path,
     grid: Grid,
@@ -251,7 +251,7 @@ pub(crate) fn scan(
     })
 }
 
-/// The warning that a header leaves open where its voxels lie.
+/// Warning for a header that does not state the position of its voxels.
 pub(crate) fn no_orientation(text: &str) -> Warning {
     Warning {
         code: WarningCode::NoOrientation,

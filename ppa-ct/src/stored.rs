@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 
 use crate::values::{Values, Voxels, with_room};
 
-/// Number types a CT may come in.
+/// Number types that a CT may be stored in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Number {
     U8,
@@ -31,7 +31,7 @@ impl Number {
     }
 }
 
-/// Numbers in a file and their way to Hounsfield units: `slope` x number + `intercept`.
+/// Stored numbers and their conversion to Hounsfield units: `slope` x number + `intercept`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stored {
     pub(crate) number: Number,
@@ -40,18 +40,18 @@ pub(crate) struct Stored {
     pub(crate) intercept: f64,
 }
 
-/// Voxels turned at a time: a buffer of at most half a megabyte.
+/// Voxels converted at a time: a buffer of at most half a megabyte.
 const CHUNK: usize = 1 << 16;
 
 impl Stored {
-    /// Bytes that a volume of `size` voxels takes; `None` above what 64 bits count.
+    /// Size in bytes of a volume of `size` voxels; `None` if it exceeds 64 bits.
     pub(crate) fn bytes_of(&self, size: [usize; 3]) -> Option<u64> {
         let width = self.number.bytes() as u64;
         size.iter()
             .try_fold(width, |bytes, &n| bytes.checked_mul(n as u64))
     }
 
-    /// Smallest and largest HU that whole numbers of this type can express; `None` for real ones.
+    /// Smallest and largest HU that integers of this type can express; `None` for floating-point types.
     pub(crate) fn representable_hu(&self) -> Option<[f64; 2]> {
         let [low, high] = match self.number {
             Number::U8 => [0.0, f64::from(u8::MAX)],
@@ -68,11 +68,11 @@ impl Stored {
         Some([low.min(high), low.max(high)])
     }
 
-    /// Reads `voxels` values; where the stream ends before, those that came whole.
+    /// Reads `voxels` values; if the stream ends early, those that are complete.
     ///
-    /// They are kept in 16 bits until one comes that these do not hold.
+    /// They are kept in 16 bits until one does not fit.
     pub(crate) fn read(&self, stream: &mut dyn Read, voxels: usize) -> io::Result<Voxels> {
-        // A file may promise more than memory holds.
+        // A file may claim more voxels than memory can hold.
         let full = |error| io::Error::new(io::ErrorKind::OutOfMemory, error);
         let width = self.number.bytes();
         let mut read = Voxels::I16(with_room(voxels).map_err(full)?);
@@ -106,7 +106,7 @@ impl Stored {
         }
     }
 
-    /// Whether the numbers are Hounsfield units of 16 bits as they stand.
+    /// Whether the numbers are 16-bit Hounsfield units without conversion.
     fn is_whole_i16(&self) -> bool {
         self.number == Number::I16 && self.slope == 1.0 && self.intercept == 0.0
     }
@@ -159,7 +159,7 @@ impl Stored {
     }
 }
 
-/// Writes values exactly and little-endian: as int16 where that holds them, else as float32.
+/// Writes values exactly and little-endian: as int16 if all fit, otherwise as float32.
 pub(crate) fn write_exact(out: &mut dyn Write, hu: Values) -> io::Result<()> {
     let short = hu.fit_i16();
     let mut bytes = Vec::with_capacity(4 * CHUNK.min(hu.len()));
@@ -220,7 +220,7 @@ mod tests {
         check!(F64, f64);
     }
 
-    /// Across the borders of the chunks, and where the first value that needs more comes late.
+    /// Across the borders of the chunks, and with the first value that needs more bits late.
     #[test]
     fn sixteen_bits_hold_values_until_one_does_not_fit() {
         for count in [0, 1, CHUNK, CHUNK + 1, 3 * CHUNK - 1] {

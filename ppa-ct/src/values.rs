@@ -1,4 +1,4 @@
-//! The numbers of a volume, as it keeps them.
+//! The values of a volume in their storage type.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -9,18 +9,18 @@ use crate::volume_error::VolumeError;
 
 /// Hounsfield units, i fastest, in the type that a [`Volume`](crate::Volume) keeps them in.
 ///
-/// CT numbers are whole in nearly every scan. Readers then keep them in 16 bits, which is half of the
-/// memory and exact. Two of these are equal when their values are.
+/// CT numbers are integers in nearly every scan. Readers then keep them in 16 bits, which is exact and
+/// takes half the memory. Two of these are equal if their values are.
 #[derive(Debug, Clone, Copy)]
 pub enum Values<'a> {
-    /// Whole numbers.
+    /// Integers.
     I16(&'a [i16]),
     /// Any numbers.
     F32(&'a [f32]),
 }
 
 impl<'a> Values<'a> {
-    /// How many there are.
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::I16(values) => values.len(),
@@ -28,7 +28,7 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -36,7 +36,7 @@ impl<'a> Values<'a> {
     /// The value at an index.
     ///
     /// # Panics
-    /// When there are fewer.
+    /// If the index is out of range.
     pub fn at(&self, index: usize) -> f32 {
         match self {
             Self::I16(values) => values[index].into(),
@@ -44,10 +44,10 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// Those at some indices.
+    /// The values at a range of indices.
     ///
     /// # Panics
-    /// When there are fewer.
+    /// If the range exceeds the values.
     pub fn part(&self, indices: Range<usize>) -> Self {
         match self {
             Self::I16(values) => Self::I16(&values[indices]),
@@ -55,12 +55,12 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// One after the other.
+    /// Iterates over the values.
     pub fn iter(self) -> impl ExactSizeIterator<Item = f32> + 'a {
         (0..self.len()).map(move |index| self.at(index))
     }
 
-    /// As a slice, which is a copy where they are kept in 16 bits.
+    /// The values as a slice, which is a copy if they are kept in 16 bits.
     pub fn to_f32(self) -> Cow<'a, [f32]> {
         match self {
             Self::I16(values) => values.iter().map(|&v| v.into()).collect(),
@@ -68,25 +68,25 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// In parts of `length`, the last of which may be shorter.
+    /// Iterates over parts of `length` values, the last of which may be shorter.
     ///
     /// # Panics
-    /// When `length` is 0.
+    /// If `length` is 0.
     pub fn parts(self, length: usize) -> impl Iterator<Item = Self> + 'a {
         let parts = 0..self.len().div_ceil(length);
         parts.map(move |n| self.part(n * length..self.len().min((n + 1) * length)))
     }
 
-    /// The same, taken by several threads.
+    /// The same as a parallel iterator.
     ///
     /// # Panics
-    /// When `length` is 0.
+    /// If `length` is 0.
     pub fn par_parts(self, length: usize) -> impl IndexedParallelIterator<Item = Self> + 'a {
         let parts = (0..self.len().div_ceil(length)).into_par_iter();
         parts.map(move |n| self.part(n * length..self.len().min((n + 1) * length)))
     }
 
-    /// Smallest and largest; infinities the wrong way round where there are none.
+    /// Smallest and largest value; +∞ and −∞ if there are none.
     pub(crate) fn range(self) -> (f32, f32) {
         let widest = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
         let none = (f32::INFINITY, f32::NEG_INFINITY);
@@ -102,16 +102,16 @@ impl<'a> Values<'a> {
         parts.reduce(|| none, widest)
     }
 
-    /// The sum; exact when the values are whole.
+    /// Sum of the values; exact if they are integers.
     pub(crate) fn sum(self) -> f64 {
         match self {
-            // Below 2^53 in every volume that memory holds.
+            // Below 2^53 in every volume that fits in memory.
             Self::I16(values) => values.par_chunks(PART).map(sum_of_whole).sum::<i64>() as f64,
             Self::F32(values) => values.iter().map(|&v| f64::from(v)).sum(),
         }
     }
 
-    /// Whether int16 holds every value exactly.
+    /// Whether int16 represents every value exactly.
     #[cfg(any(
         test,
         feature = "dicom",
@@ -127,7 +127,7 @@ impl<'a> Values<'a> {
     }
 }
 
-/// Values that one thread takes at a time.
+/// Number of values per parallel task.
 const PART: usize = 1 << 18;
 
 fn sum_of_whole(values: &[i16]) -> i64 {
@@ -147,7 +147,7 @@ impl PartialEq for Values<'_> {
 /// An empty vector with room for `voxels` values.
 ///
 /// # Errors
-/// [`VolumeError::Memory`] where a failed allocation would end the program.
+/// [`VolumeError::Memory`] where a failed allocation would otherwise abort the program.
 pub fn with_room<T>(voxels: usize) -> Result<Vec<T>, VolumeError> {
     let mut values = Vec::new();
     match values.try_reserve_exact(voxels) {
@@ -158,7 +158,7 @@ pub fn with_room<T>(voxels: usize) -> Result<Vec<T>, VolumeError> {
 
 /// `voxels` zeros to be overwritten.
 pub(crate) fn zeros<T: Clone + Default>(voxels: usize) -> Result<Vec<T>, VolumeError> {
-    // Asked for and given back: `vec!` cannot fail, but takes pages that are zero without writing them.
+    // Reserved and released first: `vec!` cannot report failure, but gets zeroed pages without writing them.
     drop(with_room::<T>(voxels)?);
     Ok(vec![T::default(); voxels])
 }
@@ -185,7 +185,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Both types answer alike, and as the plain definitions do, whatever the parts.
+        /// Both types give the same results, equal to the plain definitions, for any parts.
         #[test]
         fn the_type_changes_nothing(
             whole in prop::collection::vec(any::<i16>(), 1..200),

@@ -26,7 +26,7 @@ impl PartialEq for Volume {
 }
 
 impl Volume {
-    /// A volume from one value per voxel, i fastest.
+    /// Makes a volume from one value per voxel, i fastest.
     ///
     /// # Errors
     /// [`VolumeError`] when the number of values is wrong or one is not finite.
@@ -34,7 +34,7 @@ impl Volume {
         Self::of_voxels(grid, Voxels::F32(hu))
     }
 
-    /// A volume of whole numbers, which takes half of the memory.
+    /// Makes a volume of integers, which takes half the memory.
     ///
     /// # Errors
     /// [`VolumeError`] when the number of values is wrong.
@@ -68,19 +68,19 @@ impl Volume {
 
     /// All values, i fastest.
     ///
-    /// A copy, of twice the memory, where the volume keeps whole numbers: [`Volume::values`] spares it.
+    /// A copy of twice the memory if the volume keeps integers: [`Volume::values`] avoids it.
     pub fn hu(&self) -> Cow<'_, [f32]> {
         self.values().to_f32()
     }
 
-    /// All values, i fastest, as they are kept.
+    /// All values, i fastest, in their storage type.
     pub fn values(&self) -> Values<'_> {
         self.voxels.values()
     }
 
     /// Checks that memory has room for `bytes` more per voxel, plus a margin for small allocations.
     ///
-    /// The memory is allocated and released again: an allocation that failed later would end the program.
+    /// The memory is allocated and released again: an allocation that failed later would abort the program.
     ///
     /// # Errors
     /// [`VolumeError::Memory`].
@@ -97,7 +97,7 @@ impl Volume {
     /// The value of voxel (i, j, k).
     ///
     /// # Panics
-    /// When the voxel lies outside the grid.
+    /// If the voxel is outside the grid.
     pub fn at(&self, voxel: [usize; 3]) -> f32 {
         self.values().at(self.grid.index(voxel))
     }
@@ -133,10 +133,10 @@ impl Volume {
         Some(sum)
     }
 
-    /// The voxels `low..high` (half-open on every axis), at the same world place.
+    /// The voxels `low..high` (half-open on every axis), at the same world positions.
     ///
     /// # Errors
-    /// [`VolumeError::Grid`] when the range is empty or leaves the volume, [`VolumeError::Memory`].
+    /// [`VolumeError::Grid`] when the range is empty or exceeds the volume, [`VolumeError::Memory`].
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, VolumeError> {
         let grid = self.grid.crop(low, high)?;
         let voxels = match &*self.voxels {
@@ -149,12 +149,12 @@ impl Volume {
         })
     }
 
-    /// The smallest block of voxels that holds every voxel whose centre lies in the world box
+    /// The smallest block of voxels that contains every voxel whose centre is in the world box
     /// `min..=max` (LPS, mm).
     ///
     /// # Errors
     /// [`VolumeError::Reversed`] unless `min` ≤ `max` along every axis, [`VolumeError::Grid`] when no
-    /// centre lies in the box.
+    /// centre is in the box.
     pub fn crop_world(&self, min: &Point3<f64>, max: &Point3<f64>) -> Result<Self, VolumeError> {
         for (n, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
             let [from_mm, to_mm] = [min[n], max[n]];
@@ -200,7 +200,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against a walk over all voxels, on turned, sheared and mirrored lattices.
+        /// Compared with a search over all voxels, on rotated, sheared and mirrored lattices.
         #[test]
         fn world_crop_is_the_tightest_block_around_the_box(
             size in prop::array::uniform3(1..7_usize),

@@ -17,17 +17,17 @@ pub enum VolumeError {
         /// Voxels of the grid.
         expected: usize,
     },
-    /// A spacing to resample to is not a length.
+    /// A spacing to resample to is not a positive length.
     #[error("a spacing of {0} mm, expected a length above 0")]
     Spacing(f64),
-    /// A spacing to resample to makes more voxels than can be worked with.
+    /// A spacing to resample to gives too many voxels.
     #[error("a spacing of {spacing_mm} mm gives {voxels:.1e} voxels, expected at most {most:.1e}")]
     TooFine {
         /// Spacing asked for, mm.
         spacing_mm: f64,
-        /// Voxels that it makes.
+        /// Number of voxels that it gives.
         voxels: f64,
-        /// Most voxels.
+        /// Largest number of voxels.
         most: f64,
     },
     /// A spacing to resample to is more than twice a side of the volume.
@@ -40,7 +40,7 @@ pub enum VolumeError {
         /// The volume's side along that axis, mm.
         side_mm: f64,
     },
-    /// A box whose ends are the wrong way round, or no numbers.
+    /// A box whose ends are in the wrong order or not numbers.
     #[error("a box from {from_mm} to {to_mm} mm along {axis}, expected the smaller end first")]
     Reversed {
         /// `x`, `y` or `z`.
@@ -50,7 +50,7 @@ pub enum VolumeError {
         /// Second end, LPS.
         to_mm: f64,
     },
-    /// More voxels than there is memory for.
+    /// More voxels than fit in memory.
     #[error("not enough memory for {} and the data computed from them", ppa_core::text::count(*voxels, "voxel"))]
     Memory {
         /// Voxels asked for.

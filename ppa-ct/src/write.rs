@@ -1,4 +1,4 @@
-//! Writing a volume in the format that a name asks for.
+//! Writing a volume in the format implied by a name.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ use crate::volume::Volume;
 /// ```
 ///
 /// # Errors
-/// [`WriteError`] of the format, and for other extensions.
+/// [`WriteError`] of the format, or for other extensions.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     match Format::of_name(path)? {
         Format::Dicom => write_dicom(path, volume),
@@ -49,10 +49,10 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format in which [`write()`] writes to this name.
+    /// Returns the format in which [`write()`] writes to this name.
     ///
     /// # Errors
-    /// [`WriteError::Extension`] for other extensions than those of [`write()`].
+    /// [`WriteError::Extension`] for extensions other than those of [`write()`].
     pub fn of_name(path: &Path) -> Result<Self, WriteError> {
         let slash = path.as_os_str().as_encoded_bytes().ends_with(b"/");
         if slash || path.is_dir() || path.extension().is_none() {
@@ -72,10 +72,10 @@ impl Format {
 }
 
 impl Scan {
-    /// Writes the volume as [`write()`] does, but calls nothing a CT that its source calls something else.
+    /// Writes the volume as [`write()`] does, but refuses to write a DICOM CT if the source says that it is something else.
     ///
     /// # Errors
-    /// As [`write()`]; [`WriteError::NotCt`] where a DICOM CT is asked for, and the scan is of another modality or
+    /// The same as [`write()`]; [`WriteError::NotCt`] if a DICOM CT is asked for, and the scan is of another modality or
     /// its values are in another unit than HU.
     pub fn write(&self, path: &Path) -> Result<(), WriteError> {
         let modality = self.modality.as_deref().filter(|m| *m != "CT");

@@ -1,4 +1,4 @@
-//! Makes a leg of the built-in family and prints what a measurement of it should find.
+//! Makes a leg of the built-in family and prints the true values that measurements should give.
 //!
 //! `cargo run -p ppa-phantom --example leg_truth -- [NAME]`
 
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         truth.foot_length_mm
     );
 
-    // What a ray through the joint from front to back meets, by formula rather than by voxels.
+    // Tissues along a ray through the joint from front to back, by formula rather than by voxels.
     let start = truth.joint_centre - 200.0 * Vector3::y();
     for chord in leg.chords(&start, &Vector3::y_axis(), 400.0) {
         println!("{:5.1} mm of {:?}", chord.length_mm(), chord.tissue);

@@ -10,7 +10,7 @@ use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use ppa_ct::Volume;
 use ppa_phantom::{LowerLeg, Side, TableTop};
 
-/// Edge of a pixel of every picture over that of a voxel.
+/// Edge of a picture's pixel over that of a voxel.
 const PIXEL_OVER_VOXEL: f64 = 0.4375;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -117,7 +117,7 @@ fn picture(size_mm: [f64; 2], pixel_mm: f64, value: impl Fn(f64, f64) -> f64) ->
     })
 }
 
-/// Sum of attenuation along parallel rays from front to back, the limb turned inwards about z.
+/// Sum of attenuation along parallel rays from front to back, the limb rotated inwards about z.
 fn projection(
     ct: &Volume,
     joint: &Point3<f64>,
@@ -138,7 +138,7 @@ fn projection(
     })
 }
 
-/// The skin under a light beside the viewer.
+/// The skin under a light next to the viewer.
 fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>, pixel_mm: f64) -> GrayImage {
     let truth = limb.truth();
     let up = if towards_limb.z.abs() > 0.8 {

@@ -1,6 +1,6 @@
 //! Subchondral plates of the ankle and of the subtalar joint.
 //!
-//! Thicknesses are assumed within 0.5 to 1.5 mm. They vary from place to place: bone below the trochlea is densest on its medial
+//! Thicknesses are assumed within 0.5 to 1.5 mm. They vary with position: bone below the trochlea is densest on its medial
 //! and its lateral side, or in one place (micro CT of ten tali, Surg Radiol Anat 2013;35:283).
 
 use nalgebra::{Unit, Vector3};
@@ -18,7 +18,7 @@ pub(super) struct AnkleBones {
     pub fibula: usize,
 }
 
-/// Gives both bones of each joint their plates, as drawn in P01's size.
+/// Adds the plates to both bones of each joint, as drawn in P01's size.
 pub(super) fn add_plates(bones: &mut [Bone], p: &Parameters, mortise: &Mortise, of: &AnkleBones) {
     let along_mortise = |axis: Unit<Vector3<f64>>| mortise.limb_from_mortise * axis;
     let half_width_mm = 0.5 * p.trochlea_width_mm;

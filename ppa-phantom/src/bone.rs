@@ -10,7 +10,7 @@ use super::smooth::{smooth_max, smooth_step};
 use super::subchondral::{JointSurface, plate_near};
 use super::trabeculae::Trabeculae;
 
-/// How sharply a joint surface meets the rest of the bone, mm.
+/// Sharpness of the edge between a joint surface and the rest of the bone, mm.
 const EDGE_MM: f64 = 0.8;
 
 /// Filling of a bone at one station along it.
@@ -23,7 +23,7 @@ pub(super) struct Knot {
     pub marrow: f64,
 }
 
-/// What lies inside the surface of a bone, as a profile along one direction.
+/// Interior of a bone as a profile along one direction.
 #[derive(Debug, Clone)]
 pub(super) struct Filling {
     pub origin: Point3<f64>,
@@ -33,12 +33,12 @@ pub(super) struct Filling {
     /// HU of trabecular bone far from the surface.
     pub trabecular_hu: f64,
     pub trabeculae: Trabeculae,
-    /// Where the bone has grown in length.
+    /// Scar of the growth plate, if any.
     pub scar: Option<PhysealScar>,
 }
 
 impl Filling {
-    /// The same everywhere: a thin shell over trabecular bone.
+    /// Uniform filling: a thin shell over trabecular bone.
     pub(super) fn spongy(cortex_mm: f64, trabecular_hu: f64, trabeculae: Trabeculae) -> Self {
         Self {
             origin: Point3::origin(),
@@ -54,7 +54,7 @@ impl Filling {
         }
     }
 
-    /// A long bone of the foot: thick-walled shaft with marrow, spongy ends.
+    /// Filling of a long bone of the foot: thick-walled shaft with marrow, spongy ends.
     pub(super) fn tubular(
         from: [f64; 3],
         to: [f64; 3],
@@ -122,14 +122,14 @@ impl Filling {
     }
 }
 
-/// Joint space that a bone keeps from a neighbour; it may grow along one direction, within a range.
+/// Joint space between a bone and its neighbour; it may grow along one direction, within a range.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gap {
-    /// At the origin of the limb, mm.
+    /// Width at the origin of the limb, mm.
     pub at_origin_mm: f64,
     /// Growth per mm.
     pub slope: Vector3<f64>,
-    /// The least and the most, kept where growth would continue beyond it, mm.
+    /// Smallest and largest width, mm.
     pub range_mm: [f64; 2],
 }
 
@@ -166,10 +166,10 @@ pub(super) struct Bone {
     pub solid: Shape,
     /// Joint spaces cut out of the solid.
     pub hollows: Vec<Shape>,
-    /// Neighbours that are there first, and the joint space they keep.
+    /// Neighbours made before this bone, and the joint space to them.
     pub yields_to: Vec<(usize, Gap)>,
     pub filling: Filling,
-    /// Where the cortex is the plate below a joint.
+    /// Joint surfaces, where the cortex is the subchondral plate.
     pub joints: Vec<JointSurface>,
 }
 
@@ -208,7 +208,7 @@ impl Skeleton {
         &self.bones
     }
 
-    /// The index of the bone that holds a point, and the signed distance to its surface.
+    /// Returns the index of the bone that contains a point, and the signed distance to its surface.
     pub(super) fn bone_at(&self, p: &Point3<f64>) -> Option<(usize, f64)> {
         (0..self.bones.len())
             .filter(|&bone| self.box_distance(bone, p) == 0.0)
@@ -216,13 +216,13 @@ impl Skeleton {
             .find(|(_, distance)| *distance < 0.0)
     }
 
-    /// Distance to the box around a bone: a lower bound of the distance to the bone.
+    /// Distance to the bounding box of a bone: a lower bound of the distance to the bone.
     pub(super) fn box_distance(&self, bone: usize, p: &Point3<f64>) -> f64 {
         self.bounds[bone].distance(p)
     }
 
-    /// Thickness of the cortex of a bone at a point at this signed distance to its surface, where that may matter within
-    /// `reach_mm` of the point; deeper the thickness away from joints.
+    /// Thickness of the cortex of a bone at a point with this signed distance to its surface, if it may matter within
+    /// `reach_mm` of the point; deeper inside, the thickness away from joints.
     pub(super) fn cortex_mm(
         &self,
         bone: usize,

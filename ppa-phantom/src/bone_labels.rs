@@ -11,9 +11,9 @@ impl Limb {
         self.skeleton.bones().iter().map(|bone| bone.name).collect()
     }
 
-    /// The bone at the centre of each voxel of a lattice in the `ct` frame, i fastest; 0 where there is none.
+    /// Labels the bone at the centre of each voxel of a lattice in the `ct` frame, i fastest; 0 where there is no bone.
     ///
-    /// Metal counts as the bone in which it sits.
+    /// Metal counts as the bone that it is fixed in.
     pub fn bone_labels(&self, grid: &Grid) -> Vec<u8> {
         let mut labels = vec![0; grid.len()];
         let slice = grid.size()[0] * grid.size()[1];

@@ -1,4 +1,4 @@
-//! Boxes around shapes, so that distant shapes are skipped.
+//! Bounding boxes, by which distant shapes are skipped.
 
 use nalgebra::{Point3, Vector3};
 

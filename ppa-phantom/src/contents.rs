@@ -12,16 +12,16 @@ const SKIN_HU: f64 = 60.0;
 const FAT_HU: f64 = -100.0;
 const SOFT_HU: f64 = 50.0;
 const TENDON_HU: f64 = 85.0;
-/// Titanium is denser; scanners that store 12 bits clip it here.
+/// Titanium is denser; 12-bit scanners clip it here.
 const TITANIUM_HU: f64 = 3071.0;
-/// Thin shells of the joints and thick walls of the shafts.
+/// HU of the thin shells at joints and of the thick walls of shafts.
 const CORTICAL_HU: [f64; 2] = [1200.0, 1600.0];
 const CORTICAL_AT_MM: [f64; 2] = [1.0, 4.0];
-/// Spongy bone is denser below joint surfaces, by so much, over so many mm.
+/// Increase of the density of spongy bone below joint surfaces, and its depth in mm.
 const SUBCHONDRAL_HU: f64 = 180.0;
 const SUBCHONDRAL_MM: f64 = 5.0;
 
-/// Share of a small ball of diameter `width` at signed distance `d` that lies inside.
+/// Share of a small ball of diameter `width` at signed distance `d` that is inside.
 fn share_inside(d: f64, width: f64) -> f64 {
     (0.5 - d / width).clamp(0.0, 1.0)
 }
@@ -32,22 +32,22 @@ fn cortical_hu(cortex_mm: f64) -> f64 {
     CORTICAL_HU[0] + t * (CORTICAL_HU[1] - CORTICAL_HU[0])
 }
 
-/// Soft tissues whose boundary may pass near a point.
+/// Soft tissues with a boundary that may be near a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Near {
-    /// Skin or the fat below it; if not, the point is deep inside.
+    /// Skin or the fat below it; if false, the point is deep inside.
     pub skin: bool,
     /// Fat bodies away from the skin.
     pub deep_fat: bool,
     pub tendon: bool,
 }
 
-/// Distances at one point to everything that can change there, limb frame.
+/// Distances from one point to all boundaries near it, limb frame.
 #[derive(Debug, Default)]
 pub(super) struct Local {
-    /// Signed distance to the skin; `None` where the point is known to be deep inside.
+    /// Signed distance to the skin; `None` if the point is known to be deep inside.
     pub skin_mm: Option<f64>,
-    /// Bone, signed distance.
+    /// Index of each bone and signed distance to it.
     pub bones: Vec<(usize, f64)>,
 }
 
@@ -83,7 +83,7 @@ impl Limb {
         }
     }
 
-    /// Measures the listed bones and, where `near_skin`, the skin.
+    /// Measures the distances to the listed bones and, if `near_skin`, to the skin.
     pub(super) fn measure(
         &self,
         p: &Point3<f64>,
@@ -124,7 +124,7 @@ impl Limb {
             })
     }
 
-    /// Mean Hounsfield unit of a ball of diameter `width_mm`, and the share of it that lies in the limb.
+    /// Mean Hounsfield unit of a ball of diameter `width_mm`, and the share of it that is in the limb.
     pub(super) fn mixture(
         &self,
         p: &Point3<f64>,
@@ -150,7 +150,7 @@ impl Limb {
             } = filling.at(p);
             let cortex_mm = self.skeleton.cortex_mm(index, p, distance, width_mm);
             let core = share_inside(distance + cortex_mm, width_mm);
-            // Below the shell, not the plate, whose thickness is known near the surface only.
+            // Depth below the shell rather than the plate, whose thickness is only known near the surface.
             let depth = (-distance - shell_mm).max(0.0);
             let mut spongy =
                 filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
@@ -180,7 +180,7 @@ impl Limb {
         (hu, inside)
     }
 
-    /// Mean Hounsfield unit of the part of a ball that lies below the skin surface, bones left out.
+    /// Mean Hounsfield unit of the part of a ball below the skin surface, without bones.
     fn soft_hu(
         &self,
         p: &Point3<f64>,
@@ -202,7 +202,7 @@ impl Limb {
         hu
     }
 
-    /// Mean Hounsfield unit below the fat under the skin, bones left out.
+    /// Mean Hounsfield unit below the fat under the skin, without bones.
     fn deep_hu(&self, p: &Point3<f64>, near: Near, width_mm: f64) -> f64 {
         let envelope = &self.envelope;
         let [mut tendon_mm, mut fat_mm] = [f64::INFINITY; 2];

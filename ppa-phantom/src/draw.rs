@@ -1,14 +1,14 @@
-//! Random numbers by address: the same seed, purpose and index always draw the same number.
+//! Random numbers by address: the same seed, purpose and index always give the same number.
 
 use ppa_core::random::split_mix;
 
-/// What a number is drawn for. Part of the reproducibility contract: append, never renumber.
+/// Purpose of a random number. Part of the reproducibility contract: append, never renumber.
 #[derive(Debug, Clone, Copy)]
 #[repr(u8)]
 pub(super) enum Purpose {
     /// A dimension of a phantom drawn by seed.
     Dimension = 1,
-    /// By how much the left limb of a phantom differs from the mirror image of the right one.
+    /// Difference of a phantom's left limb from the mirror image of the right one.
     LeftSide = 2,
     /// The same for a phantom drawn by seed.
     LeftSideOfSeed = 3,
@@ -36,7 +36,7 @@ impl Stream {
         split_mix(self.0 ^ index)
     }
 
-    /// A number with mean 0 and variance 1, evenly distributed.
+    /// A uniformly distributed number with mean 0 and variance 1.
     pub(super) fn even(self, index: u64) -> f64 {
         const SCALE: f64 = 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
         self.bits(index) as i64 as f64 * SCALE
@@ -59,8 +59,8 @@ pub(super) fn normal(seed: u64, purpose: Purpose, index: u64) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// A number of this mean and deviation, at most two deviations from the mean and within a range that holds the mean: the
-/// first of the numbers of this index that lies there.
+/// A normal number with this mean and deviation, at most two deviations from the mean and within a range that contains the
+/// mean: the first number of this index that satisfies both.
 pub(super) fn truncated_normal(
     (seed, purpose, index): (u64, Purpose, u64),
     [mean, deviation]: [f64; 2],
@@ -105,7 +105,7 @@ mod tests {
         assert!((variance - 0.7737).abs() < 4.0 * 3.5 / (n as f64).sqrt());
         let cut: Vec<f64> = (0..n).map(|i| draw(i, [-0.5, 0.1])).collect();
         assert!(cut.iter().all(|z| (-0.5..=0.1).contains(z)));
-        // Those that are kept anyway stay as they are.
+        // Values within the limits are unchanged.
         let same = cut.iter().zip(&numbers).filter(|(a, b)| a == b).count();
         let kept = numbers.iter().filter(|z| (-0.5..=0.1).contains(*z)).count();
         assert_eq!(same, kept);

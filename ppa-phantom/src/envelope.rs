@@ -6,7 +6,7 @@ use super::bounds::Bounds;
 use super::sdf::{Plane, Shape};
 use super::smooth::{smooth_max, smooth_min, smooth_step};
 
-/// A shape and the box around it, so that the shape is skipped where it is far away.
+/// A shape with its bounding box, by which it is skipped where it is far away.
 #[derive(Debug, Clone)]
 pub(super) struct Bounded {
     shape: Shape,
@@ -26,20 +26,20 @@ impl Bounded {
 #[derive(Debug, Clone)]
 pub(super) struct Cover {
     pub even_mm: f64,
-    /// Thick over the calf, thin at ankle and shin, of a leg of this size relative to P01.
+    /// Thick over the calf, thin at ankle and shin; the size of the leg relative to P01.
     pub calf: Option<f64>,
-    /// Thick within 3 cm of the plane on which one stands, whose normal points down.
+    /// Thick within 3 cm of the standing plane, whose normal points down.
     pub sole: Option<Plane>,
 }
 
 /// The soft tissues.
 #[derive(Debug, Clone)]
 pub(super) struct Envelope {
-    /// What the parts are blended into.
+    /// The shape into which the parts are blended.
     pub first: Shape,
     /// Parts and the widths of their blends, mm.
     pub parts: Vec<(Bounded, f64)>,
-    /// What presses the skin flat, such as a table, and how sharply, mm.
+    /// Shapes that press the skin flat, such as a table, and the widths of their edges, mm.
     pub cuts: Vec<(Shape, f64)>,
     pub skin_mm: f64,
     pub cover: Cover,
@@ -84,7 +84,7 @@ impl Envelope {
         self.skin_mm + even_mm + calf_mm + sole_mm
     }
 
-    /// Signed distance to the fat bodies away from the skin. The tendon, which may run through them, is not taken out.
+    /// Signed distance to the fat bodies away from the skin. The tendon, which may run through them, is not subtracted.
     pub(super) fn deep_fat_distance(&self, p: &Point3<f64>) -> f64 {
         let fat = self.fat.iter().map(|fat| fat.distance(p));
         let fat = fat.reduce(|a, b| smooth_min(a, b, 1.0));

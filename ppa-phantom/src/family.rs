@@ -1,4 +1,4 @@
-//! The family of lower legs: a fixed table of seventeen, and any further by seed.
+//! The family of lower legs: a fixed table of seventeen, and any number of others by seed.
 
 use ppa_core::Side;
 
@@ -6,7 +6,7 @@ use super::draw::{Purpose, bits, truncated_normal};
 use super::family_table::{Dimensions, FAMILY, Phantom};
 use super::parameters::{P01, Parameters, Sex};
 
-/// No phantom has this name.
+/// Error for a name that is not a phantom's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("no phantom {name:?}, expected P01 to P17")]
 pub struct UnknownPhantom {
@@ -14,11 +14,11 @@ pub struct UnknownPhantom {
     pub name: String,
 }
 
-/// How the left limb of a phantom differs from the mirror image of the right one: standard deviation of each
+/// Difference of a phantom's left limb from the mirror image of the right one: relative standard deviation of each
 /// dimension. Left and right tali differ by less than 7.5 % in volume, 2.5 % in length (Bone Joint Res 2014).
 const LEFT_RIGHT_SHARE: f64 = 0.01;
 
-/// The phantom of this name, in upper or lower case.
+/// Returns the phantom of this name, in upper or lower case.
 pub(super) fn named(name: &str, side: Side) -> Result<Parameters, UnknownPhantom> {
     let is_it = |phantom: &Phantom| phantom.name.eq_ignore_ascii_case(name);
     let Some(index) = FAMILY.phantoms.iter().position(is_it) else {
@@ -35,7 +35,7 @@ pub(super) fn named(name: &str, side: Side) -> Result<Parameters, UnknownPhantom
     Ok(parameters(phantom.sex, texture_seed, &dimensions))
 }
 
-/// The phantom of this seed.
+/// Returns the phantom of this seed.
 pub(super) fn of_seed(seed: u64, side: Side) -> Parameters {
     let female = bits(seed, Purpose::Dimension, u64::MAX) & 1 == 1;
     let sex = if female { Sex::Female } else { Sex::Male };

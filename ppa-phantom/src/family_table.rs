@@ -7,19 +7,19 @@ use serde::Deserialize;
 use super::parameters::Sex;
 use super::table_list::exactly;
 
-/// How a dimension is distributed among adults.
+/// Distribution of a dimension among adults.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Dimension {
     pub name: String,
     /// Mean and standard deviation of men.
     pub men: [f64; 2],
-    /// The same of women, where sources distinguish them.
+    /// Mean and standard deviation of women, if sources distinguish them.
     pub women: Option<[f64; 2]>,
-    /// Whether the numbers above are those of a foot of P01's size, to be multiplied by the size.
+    /// Whether the numbers above apply to a foot of P01's size and are multiplied by the size.
     #[serde(default)]
     pub grows: bool,
-    /// The least and the most that is drawn, in the units of the numbers above.
+    /// Smallest and largest value drawn, in the units of the numbers above.
     #[serde(default = "unlimited")]
     pub range: [f64; 2],
 }
@@ -52,7 +52,7 @@ pub(super) struct Phantom {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Family {
-    /// What the values of a phantom are; the place of each is part of the address of its random numbers.
+    /// The dimensions of a phantom; the index of each is part of the address of its random numbers.
     #[serde(rename = "dimension", deserialize_with = "exactly")]
     pub dimensions: [Dimension; 31],
     #[serde(rename = "phantom", deserialize_with = "exactly")]

@@ -23,9 +23,9 @@ pub(super) struct Metatarsal {
 #[serde(deny_unknown_fields)]
 pub(super) struct Phalanx {
     pub name: String,
-    /// Middle of the base.
+    /// Centre of the base.
     pub base: [f64; 3],
-    /// Middle of the far end.
+    /// Centre of the far end.
     pub end: [f64; 3],
 }
 

@@ -5,12 +5,12 @@ use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use super::lower_leg::{FIBULA, LowerLeg, TALUS, TIBIA};
 use super::sdf::Plane;
 
-/// A place in a gutter.
+/// A point in a gutter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GutterPoint {
-    /// Half-way between the bones, `ct`.
+    /// Midpoint between the bones, `ct`.
     pub middle: Point3<f64>,
-    /// From the talus to the other bone.
+    /// Direction from the talus to the other bone.
     pub across: Unit<Vector3<f64>>,
     /// Bony gap along `across`, mm.
     pub width_mm: f64,
@@ -28,16 +28,16 @@ pub struct Gutters {
     pub lateral: Vec<GutterPoint>,
 }
 
-/// Wider gaps are not joint space.
+/// Largest width of a joint space; wider gaps are not counted.
 const WIDEST_MM: f64 = 6.0;
 const STEP_MM: f64 = 1.0;
-/// How far from the middle of a face its points are looked for.
+/// Distance from the middle of a face within which its points are sought.
 const REACH_MM: i32 = 25;
-/// The edges of the talus are rounded: its surface may lie so far below the plane or cone of a face, mm.
+/// Largest depth of the talus surface below the plane or cone of a face, mm: the edges of the talus are rounded.
 const EDGE_MM: f64 = 0.3;
 
 impl LowerLeg {
-    /// Every place of the three gutters that is at most 6 mm wide; widths exact to 1e-4 mm.
+    /// Returns the points of the three gutters where they are at most 6 mm wide; widths are exact to 1e-4 mm.
     pub fn gutters(&self) -> Gutters {
         let p = &self.parameters;
         let at_width = Point3::from(self.mortise.point(0.0, 0.0, -8.0 * p.size));
@@ -69,7 +69,7 @@ impl LowerLeg {
                 let turn = UnitQuaternion::from_axis_angle(&axis, arc / p.trochlea_radius_mm);
                 let outwards = turn * up;
                 let normal = Unit::new_normalize(outwards.into_inner() + axis.scale(taper));
-                // From below the surface of the cone, since a groove runs around it.
+                // Start below the surface of the cone, since a groove runs around it.
                 let radius = p.trochlea_radius_mm - along * taper - 2.0 * p.trochlea_groove_mm;
                 let below = centre + axis.scale(along) + outwards.scale(radius);
                 let talus = -self.skeleton.distance(TALUS, &below);
@@ -79,7 +79,7 @@ impl LowerLeg {
             .collect()
     }
 
-    /// The gap from a point on the talus across to another bone.
+    /// Measures the gap from a point on the talus across to another bone.
     fn gutter_at(
         &self,
         on_talus: Point3<f64>,
@@ -102,7 +102,7 @@ impl LowerLeg {
         })
     }
 
-    /// The surface of a bone along a line, from outside (`sign` 1) or inside (-1).
+    /// Finds the surface of a bone along a line, from outside (`sign` 1) or inside (-1).
     fn march(
         &self,
         from: Point3<f64>,

@@ -8,7 +8,7 @@ use super::placement::Placement;
 use super::sdf::{Cone, Plane, Shape};
 use super::trabeculae::Trabeculae;
 
-/// The ankle mortise: medial, posterior and proximal axes turned out from the limb by the mortise angle,
+/// The ankle mortise: medial, posterior and proximal axes rotated outwards from the limb by the mortise angle,
 /// origin in the middle of the superior gutter.
 #[derive(Debug, Clone)]
 pub(super) struct Mortise {
@@ -17,13 +17,13 @@ pub(super) struct Mortise {
     pub axis_z: f64,
     half_width: f64,
     half_wedge: f64,
-    /// Height at which the width of the trochlea is meant.
+    /// Height at which the width of the trochlea is defined.
     width_level: f64,
 }
 
-/// Height in P01, from the joint centre, at which the width of the trochlea is meant.
+/// Height in P01, from the joint centre, at which the width of the trochlea is defined.
 pub(super) const WIDTH_LEVEL_MM: f64 = -4.0;
-/// From the joint centre of P01 down to the sole.
+/// Distance from the joint centre of P01 down to the sole.
 pub(super) const SOLE_DEPTH_MM: f64 = 83.0;
 
 impl Mortise {
@@ -39,7 +39,7 @@ impl Mortise {
         }
     }
 
-    /// A point given as medial, posterior, proximal.
+    /// Limb coordinates of a point given as medial, posterior, proximal.
     pub(super) fn point(&self, medial: f64, posterior: f64, proximal: f64) -> [f64; 3] {
         (self.limb_from_mortise * Point3::new(medial, posterior, proximal))
             .coords
@@ -62,15 +62,15 @@ impl Mortise {
         self.limb_from_mortise * Unit::new_unchecked(Vector3::new(cosine, 0.0, sine))
     }
 
-    /// The motion of the foot that brings its toes down.
+    /// Plantarflexion of the foot.
     pub(super) fn flexion(&self, p: &Parameters) -> Placement {
         let turn = UnitQuaternion::from_axis_angle(&self.axis(p), p.plantarflexion_rad);
         Placement::rotation_wrt_point(turn, self.point(0.0, 0.0, self.axis_z).into(), 1.0)
     }
 
-    /// Where along the talocrural axis, from its middle, the groove of the trochlea runs: below the middle of the dome.
+    /// Position of the trochlear groove along the talocrural axis, from its middle: below the middle of the dome.
     ///
-    /// The dome above a place `a` of the axis, of radius R - a tan(i), lies a cos(i) - (R - a tan(i)) sin(i) medial of
+    /// The dome above a point `a` of the axis, of radius R - a tan(i), is a cos(i) - (R - a tan(i)) sin(i) medial of
     /// the middle, since the axis is inclined by i.
     pub(super) fn groove_at(&self, p: &Parameters) -> f64 {
         let (sine, cosine) = p.axis_inclination_rad.sin_cos();
@@ -169,7 +169,7 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
         ],
     );
     let mean_hu = p.spongy_hu(380.0);
-    // Along the leg, as the load (DeSilva and Devlin 2012: well ordered all over the talus); numbers assumed.
+    // Along the leg, as the load (DeSilva and Devlin 2012: well ordered throughout the talus); numbers assumed.
     let trabeculae = Trabeculae::new(mean_hu, 0.55, 1.6);
     Bone {
         name: "talus",
@@ -218,7 +218,7 @@ pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
     bone.placed(&heel_valgus(p))
 }
 
-/// The turn of the heel about the line along which it carries the talus.
+/// Rotation of the heel about the line along which it carries the talus.
 pub(super) fn heel_valgus(p: &Parameters) -> Placement {
     let pivot = Point3::new(-4.0, 10.0, 38.0 - SOLE_DEPTH_MM);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), p.heel_valgus_rad);

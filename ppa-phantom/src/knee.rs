@@ -1,4 +1,4 @@
-//! A knee: the same shapes make another joint.
+//! A knee, built from the same shapes.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use ppa_core::Side;
@@ -12,7 +12,7 @@ use super::texture::Texture;
 use super::trabeculae::Trabeculae;
 
 /// Station above the joint line, centre (medial, posterior) and semi-axes of the femur. Width over the condyles 80 mm, of
-/// the tibial plateau 75 mm, shafts of 28 mm: chosen as those of an average man, without a source.
+/// the tibial plateau 75 mm, shafts of 28 mm: typical of an average man, without a source.
 const FEMUR: [(f64, [f64; 2], [f64; 2]); 6] = [
     (22.0, [0.0, 0.0], [36.0, 23.0]),
     (35.0, [0.0, -3.0], [31.0, 19.0]),
@@ -51,7 +51,7 @@ const SKIN: [(f64, [f64; 2], [f64; 2]); 7] = [
 /// Gap between femur and tibia, and femur and patella: cartilage and menisci.
 const JOINT_MM: f64 = 4.5;
 const SKIN_MM: f64 = 1.5;
-/// Above and below the joint line, mm.
+/// Extent of the scan above and below the joint line, mm.
 const REACH_MM: f64 = 140.0;
 const TABLE_DEPTH_MM: f64 = 60.0;
 const JOINT_CENTRE_MM: [f64; 3] = [-95.0, 10.0, -150.0];
@@ -70,12 +70,12 @@ fn loft(sections: &[(f64, [f64; 2], [f64; 2])], ends: [End; 2]) -> Shape {
     )))
 }
 
-/// Trabeculae along the leg, assumed to be as far apart as in the tarsal bones.
+/// Trabeculae along the leg, with the spacing assumed for the tarsal bones.
 fn trabeculae(mean_hu: f64) -> Trabeculae {
     Trabeculae::new(mean_hu, 0.6, 1.6)
 }
 
-/// Cortex and marrow of a shaft that begins at the joint, where the direction points.
+/// Cortex and marrow of a shaft that begins at the joint and runs along `away`.
 fn shaft(away: Vector3<f64>, cortex_mm: f64) -> Filling {
     let knot = |station_mm, cortex_mm, marrow| Knot {
         station_mm,
@@ -163,8 +163,8 @@ fn skeleton() -> Skeleton {
 impl Limb {
     /// A right or left knee, extended and supine, with 14 cm of thigh and of calf: femur, tibia, fibula and patella.
     ///
-    /// Simpler than the lower leg, and without published dimensions: it shows that nothing depends on an ankle.
-    /// The left one is the mirror image of the right one. The joint centre lies in the middle of the joint line.
+    /// Simpler than the lower leg, and without published dimensions: it demonstrates that nothing depends on an ankle.
+    /// The left one is the mirror image of the right one. The joint centre is in the middle of the joint line.
     pub fn knee(side: Side) -> Self {
         let table = Plane {
             normal: Vector3::y_axis(),

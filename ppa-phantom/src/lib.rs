@@ -1,14 +1,14 @@
-//! Analytic phantoms: limbs built from signed-distance shapes, whose true shape is known everywhere.
+//! Analytic phantoms: limbs built from signed-distance shapes, with an exact ground truth everywhere.
 //!
 //! [`LowerLeg`] is a lower leg and foot, supine on a table top with the toes up: tibia and fibula, a talus with a real
 //! trochlea in its mortise, the other twenty-five bones of the foot, two sesamoids, muscle, fat and skin. [`LowerLeg::p01`]
-//! is that of an average adult man; P02 to P17 and any further by seed spread over published means and standard
-//! deviations (`data/family.toml` names the sources). [`Limb::knee`] is another joint. They are phantoms, not persons:
-//! how dimensions correlate in people is mostly unknown and left out.
+//! is that of an average adult man; P02 to P17 and any number of others by seed spread over published means and standard
+//! deviations (`data/family.toml` names the sources). [`Limb::knee`] is another joint. These are phantoms, not persons:
+//! correlations between dimensions in people are mostly unknown and left out.
 //!
-//! The same shape gives voxels ([`Limb::voxelise`], blurred and noisy through a [`Scanner`]), the skin and its normal, what a
-//! ray passes through ([`Limb::chords`]), labels of the bones, the joint gutters, and the numbers that
-//! a measurement should find ([`LowerLeg::truth`]).
+//! The same shape gives voxels ([`Limb::voxelise`], blurred and noisy through a [`Scanner`]), the skin and its normal, the tissues
+//! along a ray ([`Limb::chords`]), labels of the bones, the joint gutters, and the true values of
+//! measurements ([`LowerLeg::truth`]).
 //!
 //! Frame: `ct` (LPS, mm): x to the patient's left, which is medial for a right leg; y posterior, towards the table;
 //! z proximal. A left limb is the mirror image, on the other side of x = 0.

@@ -1,4 +1,4 @@
-//! A limb of known shape: bones in soft tissue, drawn as a right one.
+//! A limb of known shape: bones in soft tissue, modelled as a right limb.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use ppa_core::Side;
@@ -9,7 +9,7 @@ use super::plate::Plate;
 use super::texture::Texture;
 use super::tissue::Tissue;
 
-/// The part of the world that a scan shows, mm from the middle of the joint along x, y and z.
+/// Field of view of a scan, mm from the middle of the joint along x, y and z.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ScanRange {
     pub low: [f64; 3],
@@ -32,14 +32,14 @@ pub struct Limb {
     pub(super) scan: ScanRange,
     /// Height of the table top, `ct` y in mm.
     pub(super) table_top_y: f64,
-    /// Standard deviation of spongy bone between voxels of 0.8 mm, over what its trabeculae add to marrow.
+    /// Standard deviation of spongy bone between voxels of 0.8 mm, relative to the contribution of its trabeculae above marrow.
     pub(super) texture_share: f64,
-    /// Where it is denser.
+    /// Spatial pattern of the density of spongy bone.
     pub(super) texture: Texture,
 }
 
 impl Limb {
-    /// The same place on the right limb, of which a left one is the mirror image.
+    /// Maps a point to the right limb, of which a left one is the mirror image.
     pub(super) fn on_right(&self, mut p: Point3<f64>) -> Point3<f64> {
         if self.side == Side::Left {
             p.x = -p.x;
@@ -72,14 +72,14 @@ impl Limb {
     /// Signed distance from a point of the `ct` frame to the skin in mm, negative inside.
     ///
     /// Exact on the skin and to first order near it; farther away an estimate with the right sign.
-    /// The limb continues beyond what [`Limb::voxelise`] shows.
+    /// The limb continues beyond the field of view of [`Limb::voxelise`].
     pub fn skin_distance_mm(&self, p: &Point3<f64>) -> f64 {
         self.envelope.skin_distance(&self.limb_point(p))
     }
 
     /// Unit normal of the skin, outwards, at a point on or near it.
     pub fn skin_normal(&self, p: &Point3<f64>) -> Unit<Vector3<f64>> {
-        /// Small against every radius, large against rounding: the normal is good to 1e-6.
+        /// Small compared with every radius, large compared with rounding: the normal is accurate to 1e-6.
         const STEP_MM: f64 = 1e-3;
         let slope = |axis| {
             let step = Vector3::ith(axis, STEP_MM);
@@ -88,7 +88,7 @@ impl Limb {
         Unit::new_normalize(Vector3::new(slope(0), slope(1), slope(2)))
     }
 
-    /// What lies at a point of the `ct` frame.
+    /// Returns the tissue at a point of the `ct` frame.
     pub fn tissue(&self, p: &Point3<f64>) -> Tissue {
         self.tissue_in_limb(&self.limb_point(p))
     }
@@ -99,9 +99,9 @@ impl Limb {
         Some(self.skeleton.bones()[bone].name)
     }
 
-    /// A box in the `ct` frame of the right limb around the skin, as far as the scan shows it.
+    /// Bounding box of the skin in the `ct` frame of the right limb, within the field of view.
     ///
-    /// Found on a coarse lattice, so up to one step of it too large.
+    /// Found on a coarse lattice, so too large by up to one step of it.
     pub(super) fn skin_box(&self) -> (Point3<f64>, Point3<f64>) {
         const STEP_MM: f64 = 5.0;
         let centre = self.ct_from_limb * Point3::origin();

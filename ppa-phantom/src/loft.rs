@@ -10,7 +10,7 @@ pub(super) use super::section::Section;
 use super::section::{ANGLES, catmull_rom};
 use super::smooth::smooth_max;
 
-/// Where a loft ends.
+/// End of a loft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum End {
     /// Continues with its last section.
@@ -94,7 +94,7 @@ impl Loft {
             6.0 * t - 6.0 * t2,
             3.0 * t2 - 2.0 * t,
         ];
-        // Tangents are the chords over the neighbours; level at the ends.
+        // Tangents are the chords over the neighbours, and level at the ends.
         let before = if i == 0 {
             0.0
         } else {

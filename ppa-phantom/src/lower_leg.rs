@@ -19,7 +19,7 @@ use super::texture::Texture;
 use super::trabeculae::MARROW_HU;
 use super::{hindfoot, midfoot_forefoot, tibia_fibula};
 
-/// A lower leg and foot of known shape; as a [`Limb`] it can be voxelised and asked for its tissues.
+/// A lower leg and foot of known shape; dereferences to its [`Limb`].
 #[derive(Debug, Clone)]
 pub struct LowerLeg {
     pub(super) parameters: Parameters,
@@ -37,7 +37,7 @@ impl Deref for LowerLeg {
     }
 }
 
-/// Indices of the bones, in the order in which they are made.
+/// Indices of the bones, in the order in which they are built.
 pub(super) const TALUS: usize = 0;
 pub(super) const CALCANEUS: usize = 1;
 pub(super) const TIBIA: usize = 2;
@@ -59,10 +59,10 @@ impl LowerLeg {
         Ok(Self::new(family::named(name, side)?, side))
     }
 
-    /// A phantom drawn around the published averages by seed; each dimension within two standard deviations.
+    /// Draws a phantom around the published averages by seed; each dimension is within two standard deviations.
     ///
-    /// Size is common to all lengths. Whether the other dimensions go together in people is
-    /// not known: here they are independent.
+    /// Size scales all lengths together. Correlations of the other dimensions in people are unknown, so these
+    /// are drawn independently.
     pub fn from_seed(seed: u64, side: Side) -> Self {
         Self::new(family::of_seed(seed, side), side)
     }
@@ -142,12 +142,12 @@ impl LowerLeg {
         self
     }
 
-    /// The limb without what is known about its ankle.
+    /// Returns the limb without the dimensions of its ankle.
     pub fn into_limb(self) -> Limb {
         self.limb
     }
 
-    /// Whose average the dimensions are drawn around.
+    /// Sex whose averages the dimensions are drawn around.
     pub fn sex(&self) -> Sex {
         self.parameters.sex
     }
@@ -166,12 +166,12 @@ impl LowerLeg {
             .placed(&self.flexion())
     }
 
-    /// The motion of the talus from a right angle between foot and leg.
+    /// Rotation of the talus from a right angle between foot and leg.
     pub(super) fn flexion(&self) -> Placement {
         self.mortise.flexion(&self.parameters)
     }
 
-    /// From the joint centre to the plane on which one stands.
+    /// Distance from the joint centre to the standing plane.
     pub(super) fn sole_depth_mm(&self) -> f64 {
         -lower_leg_skin::sole()
             .placed(&self.foot_placement)

@@ -20,20 +20,20 @@ use super::smooth::smooth_step;
 /// Centre and semi-axes of the heel.
 const HEEL: ([f64; 3], [f64; 3]) = ([-3.0, 27.0, 30.0 - SOLE_DEPTH_MM], [31.0, 34.5, 34.0]);
 
-/// Where the table has pressed the skin flat, the edge of the flat patch is rounded over so many mm; heel and calf would
-/// sink at least as deep, so that their middle touches the table.
+/// Radius of the rounded edge of the flat patch where the table has pressed the skin; heel and calf would sink
+/// at least as deep, so that their middle touches the table.
 const TABLE_EDGE_MM: f64 = 3.0;
 
 /// Pose of the limb on the table.
 pub(super) struct Rest {
     /// Rise of the tibial axis from the table towards the knee.
     pub rise_rad: f64,
-    /// From the joint centre back to the table top, across the table.
+    /// Distance from the joint centre back to the table top, perpendicular to the table.
     pub depth_mm: f64,
 }
 
 impl Rest {
-    /// Heel and calf sink into the table as deep as those of P01 do, which lies 58 mm above it and rises by 3°.
+    /// Heel and calf sink into the table as deep as those of P01, whose joint centre is 58 mm above it and which rises by 3°.
     pub(super) fn new(p: &Parameters, foot_placement: &Placement) -> Self {
         const P01_RISE_RAD: f64 = 3.0_f64.to_radians();
         const CALF_MM: f64 = 250.0;
@@ -50,31 +50,31 @@ impl Rest {
     }
 }
 
-/// How much wider than in P01 a section of the shank is behind; in front the shin lies below the skin in every leg.
+/// Relative widening of the back of a section of the shank against P01; in front, the shin is just below the skin in every leg.
 fn wider_behind(p: &Parameters, station: f64) -> f64 {
     let calf = smooth_step(75.0, 200.0, station);
-    // Towards the malleoli bone lies below the skin all around.
+    // Towards the malleoli, bone is just below the skin all around.
     let ankle = smooth_step(-20.0, 60.0, station) * (1.0 - calf);
     ankle * (p.ankle_girth - 1.0) + calf * (p.calf_girth - 1.0)
 }
 
-/// How far the bones of the leg turn a section of the shank with them, away from that of P01.
+/// Rotation of a section of the shank with the bones of the leg, relative to P01.
 fn turn_rad(p: &Parameters, station: f64) -> f64 {
     smooth_step(10.0, 90.0, station) * (P01.mortise_angle_rad - p.mortise_angle_rad)
 }
 
-/// A section of the shank with the girth of the leg, turned with the bones of the leg.
+/// A section of the shank with the girth of the leg, rotated with its bones.
 fn shank_section(p: &Parameters, section: &ShankSection) -> Section {
     let wider = wider_behind(p, section.station);
     let radii: [f64; 12] = std::array::from_fn(|n| {
-        // From nothing in front to twice the mean behind.
+        // From zero in front to twice the mean behind.
         let behind = 1.0 + (n as f64 / 12.0 * TAU).sin();
         section.radii[n] * (1.0 + wider * behind)
     });
     Section::polar(section.station, section.centre, &radii).turned(turn_rad(p, section.station))
 }
 
-/// A place so far below the skin at the back of a section of the shank.
+/// A point at a depth below the skin at the back of a section of the shank.
 fn below_the_back(p: &Parameters, section: &ShankSection, depth_mm: f64) -> [f64; 3] {
     const BACK: usize = 3; // the fourth radius is the one at 90°
     let station = section.station;
@@ -84,7 +84,7 @@ fn below_the_back(p: &Parameters, section: &ShankSection, depth_mm: f64) -> [f64
     [place.x, place.y, station]
 }
 
-/// The Achilles tendon, from the heel to where the calf begins, in the drawing of the leg.
+/// The Achilles tendon, from the heel to the start of the calf, in the drawing of the leg.
 fn achilles(p: &Parameters, insertion: Point3<f64>) -> Shape {
     let [ankle, above, calf] = [(3, 3.6), (4, 3.8), (6, 10.0)]
         .map(|(section, depth_mm)| below_the_back(p, &SKIN.shank[section], depth_mm));
@@ -161,7 +161,7 @@ fn toes(p: &Parameters) -> impl Iterator<Item = (Point3<f64>, f64, Point3<f64>, 
         })
 }
 
-/// The plane on which one stands, normal downwards.
+/// The standing plane, normal downwards.
 pub(super) fn sole() -> Plane {
     Plane {
         normal: -Vector3::z_axis(),
@@ -169,7 +169,7 @@ pub(super) fn sole() -> Plane {
     }
 }
 
-/// The skin as drawn in P01's size goes to its place with `leg`, and that of the foot with `foot_placement`.
+/// Places the skin, drawn in P01's size, with `leg_placement`, and that of the foot with `foot_placement`.
 pub(super) fn envelope(
     p: &Parameters,
     mortise: &Mortise,
@@ -185,7 +185,7 @@ pub(super) fn envelope(
     let from_leg = leg_placement.inverse();
     let insertion = from_leg * (heel * Point3::new(-3.0, 44.0, -42.0));
     let achilles = achilles(p, insertion);
-    // Kager's fat, between the tendon, with which it moves, and the deep flexors behind the tibia.
+    // Kager's fat, between the tendon, which it follows, and the deep flexors behind the tibia.
     let [_, back, _] = below_the_back(p, &SKIN.shank[3], 17.5);
     let kager = Shape::common(
         3.0,
@@ -221,7 +221,7 @@ pub(super) fn envelope(
     }
 }
 
-/// The skin of the most forward toe, given the transform to the frame in which -y is forward.
+/// Foremost point of the skin of the toes, given the transform to the frame in which -y is forward.
 pub(super) fn toe_tip(
     p: &Parameters,
     foot_placement: &Placement,

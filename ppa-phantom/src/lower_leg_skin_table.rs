@@ -9,10 +9,10 @@ use super::table_list::exactly;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ShankSection {
-    /// Above the joint.
+    /// Height above the joint.
     pub station: f64,
     pub centre: [f64; 2],
-    /// Every 30° from medial over posterior.
+    /// Radii every 30° from medial over posterior.
     #[serde(deserialize_with = "exactly")]
     pub radii: [f64; 12],
 }
@@ -20,11 +20,11 @@ pub(super) struct ShankSection {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FootSection {
-    /// In front of the joint.
+    /// Distance in front of the joint.
     pub station: f64,
     /// x, height above the sole.
     pub corners: Vec<[f64; 2]>,
-    /// The radius by which the corners are grown.
+    /// Radius by which the polygon is grown.
     pub round: f64,
 }
 

@@ -10,14 +10,14 @@ use super::parameters::{Parameters, TABLES};
 use super::sdf::Shape;
 use super::trabeculae::Trabeculae;
 
-/// Indices of the bones that carry the midfoot.
+/// Indices of the hindfoot bones that carry the midfoot.
 pub(super) struct Hindfoot {
     pub talus: usize,
     pub calcaneus: usize,
 }
 
 /// Sesamoids below the head of the first metatarsal: centre and semi-axes in P01. Sizes are assumed: 12 mm long, the
-/// medial one wider; cut to the head above them.
+/// medial one wider; cut to fit the head above them.
 const SESAMOIDS: [(&str, [f64; 3], [f64; 3]); 2] = [
     ("medial sesamoid", [32.2, -131.0, -75.2], [4.8, 6.0, 3.2]),
     ("lateral sesamoid", [20.8, -131.5, -75.2], [4.2, 5.6, 3.2]),
@@ -47,7 +47,7 @@ fn phalanx(base: [f64; 3], end: [f64; 3], waist: f64) -> Shape {
     )
 }
 
-/// How far the heads of the five metatarsals and their toes lie further forward than in the tables.
+/// Forward shift of the heads of the five metatarsals and their toes relative to the tables.
 pub(super) fn ray_shifts_mm(p: &Parameters) -> [f64; 5] {
     let [first, third, fourth, fifth] =
         std::array::from_fn(|ray| p.metatarsal_heads_mm[ray] - TABLES.metatarsal_heads_mm[ray]);
@@ -71,7 +71,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
         });
         bones.len() - 1
     };
-    // Assumed: as in the talus, along the foot.
+    // Along the foot; numbers assumed as in the talus.
     let trabeculae = |mean_hu| Trabeculae::new(mean_hu, 0.6, 1.6).along(&-Vector3::y_axis());
     let spongy = || {
         let mean_hu = p.spongy_hu(260.0);
@@ -81,7 +81,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
         let mean_hu = p.spongy_hu(p01_hu);
         Filling::tubular(from, to, shaft_cortex_mm, mean_hu, trabeculae(mean_hu))
     };
-    // Turned about the foot's length by the transverse arch, then forward and down with the longitudinal one.
+    // Rotated about the foot's long axis by the transverse arch, then forward and down with the longitudinal one.
     let arched = |transverse: f64, longitudinal: f64| {
         Rotation3::from_axis_angle(&Vector3::x_axis(), longitudinal.to_radians())
             * Rotation3::from_axis_angle(&Vector3::y_axis(), transverse.to_radians())

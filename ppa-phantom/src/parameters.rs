@@ -1,8 +1,8 @@
-//! The numbers that make one phantom.
+//! Parameters of a phantom.
 
 use serde::Deserialize;
 
-/// Whose average a phantom is drawn around.
+/// Sex whose averages a phantom is drawn around.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sex {
@@ -14,14 +14,14 @@ pub enum Sex {
 
 /// Dimensions of a right lower leg and foot; mm and radians.
 ///
-/// Sources: talus, mortise, malleoli and syndesmosis from the CT and cadaver studies named at the fields
-/// (mean ± SD); dimensions without a name are chosen within the range of adult anatomy.
+/// Sources: talus, mortise, malleoli and syndesmosis from the CT and cadaver studies cited at the fields
+/// (mean ± SD); dimensions without a citation are chosen within the range of adult anatomy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parameters {
     pub sex: Sex,
-    /// All lengths that no other field shows, relative to P01.
+    /// Size of all lengths without a field of their own, relative to P01.
     pub size: f64,
-    /// Internal rotation that turns both malleoli parallel to the detector: 19.1° ± 5.0°, n = 128 feet.
+    /// Internal rotation at which both malleoli are parallel to the detector: 19.1° ± 5.0°, n = 128 feet.
     pub mortise_angle_rad: f64,
     /// Bony gap between trochlea and plafond: 2.89 ± 0.56 (Zhang 2014).
     pub superior_gutter_mm: f64,
@@ -30,20 +30,20 @@ pub(super) struct Parameters {
     /// Bony gap between talus and lateral malleolus: 2.45 ± 0.55 (Goker 2009).
     pub lateral_gutter_mm: f64,
     /// Bony gap between tibia and fibula at the front and at the back of the incisura: 2.2 ± 0.9 and 3.5 ± 0.9
-    /// (n = 203); over both 2.7 ± 0.8 (PMC7937306).
+    /// (n = 203); mean of both 2.7 ± 0.8 (PMC7937306).
     pub syndesmosis_mm: [f64; 2],
     /// Depth of the incisura below the tubercles that flank it, at the plafond: 3.3 ± 1.2 (n = 203).
     pub incisura_depth_mm: f64,
-    /// Sagittal radius of the trochlea: 20.7 ± 2.6 over both sexes (PMC1888582), which makes 21.8 in men.
+    /// Sagittal radius of the trochlea: 20.7 ± 2.6 over both sexes (PMC1888582), or 21.8 in men.
     pub trochlea_radius_mm: f64,
-    /// Width of the trochlea half-way along it: 27.9 ± 3.0 over both sexes (PMC1888582), which makes 29.4 in men.
+    /// Width of the trochlea half-way along it: 27.9 ± 3.0 over both sexes (PMC1888582), or 29.4 in men.
     pub trochlea_width_mm: f64,
     /// Angle between its medial and lateral facet; 29.9 mm in front and 25.2 mm behind (PMC1888582) would
     /// be 9.0°, within the spread of both widths.
     pub trochlea_wedge_rad: f64,
     /// Depth of the groove between its crests: 1.3 in front, 0.6 behind (Thai J Surg).
     pub trochlea_groove_mm: f64,
-    /// How far the lateral end of the talocrural axis lies below the level of the medial end; dome
+    /// Height of the medial end of the talocrural axis above the lateral end, as an angle; dome
     /// inclination 9.9° ± 3.3° (BioMed Res Int 2019:8634159).
     pub axis_inclination_rad: f64,
     /// Slope of the medial facet away from the vertical; tibia and medial malleolus enclose 114° (PMC3117279).
@@ -54,7 +54,7 @@ pub(super) struct Parameters {
     pub medial_malleolus_mm: f64,
     /// Reach of the lateral malleolus below the joint line: 27.4 ± 3.8 (Patil 2012).
     pub lateral_malleolus_mm: f64,
-    /// How far the heads of metatarsals I, III, IV and V lie in front of that of II: 0.9 ± 2.7, -4.4 ± 1.6,
+    /// Distance of the heads of metatarsals I, III, IV and V in front of that of II: 0.9 ± 2.7, -4.4 ± 1.6,
     /// -11.2 ± 2.2, -20.2 ± 3.8 (PMC3932714).
     pub metatarsal_heads_mm: [f64; 4],
     /// Cortex of the tibia 25, 100 and 200 mm above the joint of a leg of P01's size: 0.5–1.5, 2–4 and 4–6, growing
@@ -64,15 +64,15 @@ pub(super) struct Parameters {
     pub trabecular_hu: f64,
     /// Standard deviation of spongy bone in the distal tibia between voxels of 0.8 mm, HU; other bones in proportion.
     pub trabecular_texture_hu: f64,
-    /// Seed of the places where spongy bone is denser.
+    /// Seed of the density pattern of spongy bone.
     pub texture_seed: u64,
     /// Girth of the leg just above the malleoli, relative to P01's at the same size.
     pub ankle_girth: f64,
     /// Girth of the calf, relative to P01's at the same size.
     pub calf_girth: f64,
-    /// Toes down from a right angle between foot and leg.
+    /// Plantarflexion from a right angle between foot and leg.
     pub plantarflexion_rad: f64,
-    /// Turn of the heel's lower end away from the midline.
+    /// Rotation of the heel's lower end away from the midline.
     pub heel_valgus_rad: f64,
     /// Gap between the bones of the other joints.
     pub small_joint_mm: f64,
@@ -80,7 +80,7 @@ pub(super) struct Parameters {
     pub skin_mm: f64,
     /// Length of lower leg inside the scan, from the joint centre proximally.
     pub leg_length_mm: f64,
-    /// Place of the joint centre in the scanner.
+    /// Position of the joint centre in the scanner.
     pub joint_centre_ct_mm: [f64; 3],
 }
 
@@ -118,7 +118,7 @@ pub(super) const P01: Parameters = Parameters {
     joint_centre_ct_mm: [-92.0, 14.0, -310.0],
 };
 
-/// The foot that the tables of sections were drawn around: bones and skin lie further out or in by the difference.
+/// The foot for which the tables of sections were drawn: bones and skin are shifted by the difference from it.
 pub(super) const TABLES: Parameters = Parameters {
     trochlea_width_mm: 27.9,
     medial_facet_slope_rad: 20.0_f64.to_radians(),
@@ -126,7 +126,7 @@ pub(super) const TABLES: Parameters = Parameters {
 };
 
 impl Parameters {
-    /// The foot as it is drawn before it is resized: every length over `size`.
+    /// The parameters before resizing: every length divided by `size`.
     pub(super) fn drawn(&self) -> Self {
         let mm = |length: f64| length / self.size;
         Self {
@@ -150,12 +150,12 @@ impl Parameters {
         }
     }
 
-    /// HU of spongy bone that has `p01_hu` in P01.
+    /// HU of spongy bone that is `p01_hu` in P01.
     pub(super) fn spongy_hu(&self, p01_hu: f64) -> f64 {
         p01_hu * (self.trabecular_hu / P01.trabecular_hu)
     }
 
-    /// How far the lateral malleolus and all that goes with it lies further out than in the tables.
+    /// Outward shift of the lateral malleolus and everything attached to it, relative to the tables.
     pub(super) fn lateral_shift_mm(&self) -> f64 {
         self.side_shift_mm() + self.lateral_gutter_mm - TABLES.lateral_gutter_mm
     }
@@ -165,13 +165,13 @@ impl Parameters {
         self.side_shift_mm() + self.medial_gutter_mm - TABLES.medial_gutter_mm
     }
 
-    /// How far the medial facet, at this depth below the level of its width, lies further out than in the tables
-    /// because it slopes more.
+    /// Outward shift of the medial facet relative to the tables due to its larger slope, at this depth below the level of
+    /// its width.
     pub(super) fn medial_lean_mm(&self, depth_mm: f64) -> f64 {
         depth_mm * (self.medial_facet_slope_rad.tan() - TABLES.medial_facet_slope_rad.tan())
     }
 
-    /// How far each facet of the trochlea lies further out than in the tables.
+    /// Outward shift of each facet of the trochlea relative to the tables.
     pub(super) fn side_shift_mm(&self) -> f64 {
         0.5 * (self.trochlea_width_mm - TABLES.trochlea_width_mm)
     }

@@ -1,4 +1,4 @@
-//! Shapes moved, turned and resized: the tables describe one foot, a placement turns it into another one.
+//! Shapes moved, rotated and resized: the tables describe one foot, a placement transforms it into another one.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 

@@ -2,5 +2,5 @@
 
 use nalgebra::Similarity3;
 
-/// Where a drawn shape goes: `limb_from_drawing`, lengths times its scaling.
+/// Similarity transform of a drawn shape, `limb_from_drawing`.
 pub(super) type Placement = Similarity3<f64>;

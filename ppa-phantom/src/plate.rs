@@ -15,9 +15,9 @@ const HALF_LENGTH_MM: f64 = 32.0;
 const SCREWS_MM: [f64; 5] = [-26.0, -13.0, 0.0, 13.0, 26.0];
 const SCREW_RADIUS_MM: f64 = 1.75;
 const HEAD_RADIUS_MM: f64 = 3.0;
-/// Film of tissue between plate and bone.
+/// Thickness of the tissue film between plate and bone.
 const FILM_MM: f64 = 0.2;
-/// Soft tissue that covers the plate.
+/// Thickness of the soft tissue that covers the plate.
 const COVER_MM: f64 = 4.0;
 
 /// A plate bent to the outer face of a bone, and screws through it; limb frame.
@@ -33,7 +33,7 @@ pub(super) struct Plate {
 }
 
 impl Plate {
-    /// On the lateral face of the fibula, its lower end 2 cm above the joint; `size` is that of the leg.
+    /// A plate on the lateral face of the fibula, its lower end 2 cm above the joint; `size` is that of the leg.
     pub(super) fn on_fibula(fibula: &Shape, mortise: &Mortise, size: f64) -> Self {
         let bone = fibula.clone();
         let posterior = 3.5 * size;
@@ -51,7 +51,7 @@ impl Plate {
         for height in SCREWS_MM {
             let proximal = middle + height;
             let [outer, inner] = faces(proximal);
-            // Into the far cortex, not through it.
+            // The screw ends in the far cortex.
             let tip = at(inner - 2.0 - SCREW_RADIUS_MM, proximal);
             let head = at(outer - FILM_MM - 0.5 * THICKNESS_MM, proximal);
             screws.push(Shape::round_cone(
@@ -83,12 +83,12 @@ impl Plate {
         }
     }
 
-    /// The skin over the plate, and how softly it joins the rest.
+    /// The skin over the plate, and the width of its blend.
     pub(super) fn bulge(&self) -> (Bounded, f64) {
         (Bounded::new(self.bulge.clone()), 10.0)
     }
 
-    /// Signed distance to the metal, mm; far away a lower bound.
+    /// Signed distance to the metal, mm; a lower bound far away.
     pub(super) fn distance(&self, p: &Point3<f64>) -> f64 {
         let far = self.bounds.distance(p);
         if far > 5.0 {

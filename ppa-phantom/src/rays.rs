@@ -5,14 +5,14 @@ use nalgebra::{Point3, Unit, Vector3};
 use super::limb::Limb;
 use super::tissue::Tissue;
 
-/// A stretch of a ray inside one tissue; distances from the ray's origin, mm.
+/// A section of a ray inside one tissue; distances from the ray's origin, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chord {
-    /// What the ray passes through.
+    /// Tissue of the section.
     pub tissue: Tissue,
-    /// Where it enters.
+    /// Distance at which the ray enters.
     pub from_mm: f64,
-    /// Where it leaves.
+    /// Distance at which it leaves.
     pub to_mm: f64,
 }
 
@@ -34,19 +34,19 @@ pub struct SkinHit {
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// Crossings are found to this, mm.
+/// Accuracy of crossings, mm.
 const TOLERANCE_MM: f64 = 1e-7;
-/// Shortest step: a thinner stretch of tissue may be passed over.
+/// Shortest step: a thinner section of tissue may be missed.
 const LEAST_STEP_MM: f64 = 0.02;
 /// Longest step inside bone, where marrow begins without a surface.
 const STEP_IN_BONE_MM: f64 = 1.0;
-/// Distances are estimates: trust them only within this factor.
+/// Safety factor: distances are estimates.
 const CAUTION: f64 = 1.5;
 
 impl Limb {
     /// The tissues along a ray up to `reach_mm`, in order, without the air outside the limb.
     ///
-    /// Ends are exact to 1e-7 mm; a stretch shorter than 0.02 mm may be missed. The table is not part of the limb.
+    /// Ends are exact to 1e-7 mm; a section shorter than 0.02 mm may be missed. The table is not part of the limb.
     pub fn chords(
         &self,
         origin: &Point3<f64>,
@@ -76,7 +76,7 @@ impl Limb {
             }
             let leaves = bisect(t, next, |t| self.tissue_in_limb(&at(t)) == tissue);
             push(tissue, entered, leaves);
-            // A third tissue may lie before `next`: continue just behind the surface.
+            // A third tissue may come before `next`: continue just behind the surface.
             (t, entered) = (leaves, leaves);
             tissue = self.tissue_in_limb(&at(leaves));
         }
@@ -84,10 +84,10 @@ impl Limb {
         chords
     }
 
-    /// Where a ray first crosses the skin, exact to 1e-7 mm: where it enters the limb, or, from an origin inside, where
+    /// Returns where a ray first crosses the skin, exact to 1e-7 mm: where it enters the limb or, from an origin inside, where
     /// it leaves it. `None` if it does neither within `reach_mm`.
     ///
-    /// A stretch shorter than 0.02 mm inside the limb, or outside of it, may be missed.
+    /// A section shorter than 0.02 mm inside or outside the limb may be missed.
     pub fn skin_hit(
         &self,
         origin: &Point3<f64>,
@@ -124,7 +124,7 @@ impl Limb {
         (self.limb_point(origin), along)
     }
 
-    /// How far a point of the limb frame is from everything at which the tissue may change, about.
+    /// Approximate distance from a point of the limb frame to the nearest place where the tissue may change.
     fn clearance(&self, p: &Point3<f64>) -> f64 {
         let envelope = &self.envelope;
         let skin = envelope.skin_distance(p);
@@ -164,7 +164,7 @@ impl Limb {
     }
 }
 
-/// The end of the stretch from `low` on which `holds`, just past it; it does not hold at `high`.
+/// Finds the end of the section from `low` on which `holds`, just past it; it does not hold at `high`.
 fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     while high - low > TOLERANCE_MM {
         let middle = 0.5 * (low + high);

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use super::draw::{Purpose, normal};
 use super::voxelise::PhantomError;
 
-/// A scanner with a Gaussian point spread and white noise, which stores whole Hounsfield units of 12 bits.
+/// A scanner with a Gaussian point spread and white noise that stores integer Hounsfield units of 12 bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scanner {
-    /// Full width at half maximum of the point spread along every axis, mm; 0 for none. It spreads what voxels hold,
-    /// which are means over their own width already.
+    /// Full width at half maximum of the point spread along every axis, mm; 0 for none. It is applied to the voxel values,
+    /// which are already means over a voxel's width.
     pub blur_fwhm_mm: f64,
     /// Standard deviation of the noise of a voxel, HU.
     pub noise_hu: f64,
@@ -19,16 +19,16 @@ pub struct Scanner {
     pub seed: u64,
 }
 
-/// Values of 12 bits.
+/// Range of 12-bit values.
 const RANGE_HU: [f64; 2] = [-1024.0, 3071.0];
 
 impl Scanner {
-    /// The volume as this scanner would store it; the same for any number of threads.
+    /// Returns the volume as this scanner would store it; the result does not depend on the number of threads.
     ///
-    /// Voxels beyond the field of view count as those on its faces.
+    /// Voxels beyond the field of view have the values at its faces.
     ///
     /// # Errors
-    /// [`PhantomError::Scanner`] unless blur and noise lie between 0 and 20 mm, 0 and 1000 HU.
+    /// [`PhantomError::Scanner`] unless blur and noise are between 0 and 20 mm, 0 and 1000 HU.
     pub fn scan(&self, phantom: &Volume) -> Result<Volume, PhantomError> {
         for (what, found, most) in [
             ("a blur in mm", self.blur_fwhm_mm, 20.0),
@@ -56,10 +56,10 @@ impl Scanner {
     }
 }
 
-/// A Gaussian in voxels, from the middle outwards, whose sum is 1 and whose variance is that of `sigma`.
+/// Weights of a Gaussian in voxels, from the centre outwards, with sum 1 and variance `sigma` squared.
 ///
-/// A Gaussian of less than about half a voxel has a smaller variance on the lattice than between its points, down to
-/// none at all: the one that is sampled is so much wider that the lattice sees `sigma`.
+/// A Gaussian of less than about half a voxel, sampled at the lattice points, has too small a variance, down to zero:
+/// a wider one is therefore sampled so that its variance on the lattice is correct.
 fn kernel(sigma: f64) -> Vec<f64> {
     let (mut narrow, mut wide) = (0.0, sigma + 0.5);
     for _ in 0..60 {
@@ -87,7 +87,7 @@ fn variance(half: &[f64]) -> f64 {
     2.0 * squares.sum::<f64>()
 }
 
-/// Values convolved along the axis with this many voxels and this distance in memory.
+/// Convolves values along the axis with this many voxels and this stride in memory.
 fn blurred(
     hu: &[f32],
     count: usize,

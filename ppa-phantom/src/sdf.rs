@@ -1,8 +1,8 @@
 //! Signed-distance shapes and their smooth combinations.
 //!
-//! Every shape answers with a signed distance in mm, negative inside. Spheres, round cones and half-spaces are
-//! exact; ellipsoids, lofts and smooth combinations are first-order estimates: exact on the surface, with a slope near 1 close to it. Smooth
-//! combinations follow the quadratic polynomial blend, which never raises the slope above that of its parts.
+//! Every shape returns a signed distance in mm, negative inside. Spheres, round cones and half-spaces are exact;
+//! ellipsoids, lofts and smooth combinations are first-order estimates: exact on the surface, with a slope near 1 close to it. Smooth
+//! combinations use the quadratic polynomial blend, which never raises the slope above that of its parts.
 
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 
@@ -194,7 +194,7 @@ impl Shape {
         }
     }
 
-    /// A box that holds the shape.
+    /// Bounding box of the shape.
     pub(super) fn bounds(&self) -> Bounds {
         match self {
             Self::Ellipsoid { centre, semi, .. } => Bounds::ball(centre, semi.max()),
@@ -223,7 +223,7 @@ impl Shape {
     }
 }
 
-/// First-order distance: the implicit function over its gradient, which is exact on the surface.
+/// First-order distance: the implicit function divided by its gradient, which is exact on the surface.
 fn ellipsoid_distance(q: &Vector3<f64>, semi: &Vector3<f64>) -> f64 {
     let level = q.component_div(semi).norm();
     let slope = q.component_div(&semi.component_mul(semi)).norm();
@@ -245,7 +245,7 @@ fn round_cone_distance(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>, ra: f6
     let across = (q.norm_squared() - along * along).max(0.0).sqrt();
     let sine = (ra - rb) / length;
     let cosine = (1.0 - sine * sine).sqrt();
-    // The tangent cone touches the balls where the foot point leaves the segment on either side.
+    // The tangent cone touches the balls where the foot of the perpendicular leaves the segment on either side.
     let foot = along - across * sine / cosine;
     if foot < 0.0 {
         q.norm() - ra

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
-/// Radii per section; 7.5° apart.
+/// Number of radii per section, 7.5° apart.
 pub(super) const ANGLES: usize = 48;
 
 /// One cross-section: radii around a centre, counted from the first local axis towards the second.
@@ -41,7 +41,7 @@ impl Section {
         }
     }
 
-    /// The section turned about the axis, from the first local axis towards the second.
+    /// The section rotated about the axis, from the first local axis towards the second.
     pub(super) fn turned(&self, angle_rad: f64) -> Self {
         let n = ANGLES as f64;
         let radii = std::array::from_fn(|i| {

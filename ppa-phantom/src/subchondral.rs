@@ -1,17 +1,17 @@
-//! Subchondral plates: below the surfaces of a joint the cortex is thicker than elsewhere, and its thickness varies.
+//! Subchondral plates: the cortex is thicker below the surfaces of a joint than elsewhere, and its thickness varies.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::placement::Placement;
 use super::smooth::smooth_step;
 
-/// A surface is wholly that of a joint up to so much more than the gap of the joint from the other bone, and not at all
-/// from so much more on, mm.
+/// Distances to the other bone, beyond the gap of the joint, up to which a surface is fully part of the joint and from
+/// which it is not part of it, mm.
 const JOINT_ENDS_MM: [f64; 2] = [0.5, 5.0];
-/// No plate is thicker, mm.
+/// Largest thickness of a plate, mm.
 const THICKEST_MM: f64 = 2.0;
 
-/// A surface of a bone in a joint.
+/// A joint surface of a bone.
 #[derive(Debug, Clone)]
 pub(super) struct JointSurface {
     /// Index of the bone across the joint.
@@ -21,9 +21,9 @@ pub(super) struct JointSurface {
     /// Thickness of the plate in the middle of the surface and at its sides, mm.
     pub plate_mm: [f64; 2],
     pub middle: Point3<f64>,
-    /// From the middle to either side.
+    /// Direction from the middle to either side.
     pub across: Unit<Vector3<f64>>,
-    /// How far the sides are from the middle, mm.
+    /// Distance from the middle to the sides, mm.
     pub reach_mm: f64,
 }
 
@@ -41,12 +41,12 @@ impl JointSurface {
         }
     }
 
-    /// Farthest from the other bone that a point of the plate, or one within `reach_mm` of it, can be.
+    /// Largest distance to the other bone of a point of the plate, or of one within `reach_mm` of it.
     pub(super) fn farthest_mm(&self, reach_mm: f64) -> f64 {
         self.gap_mm + JOINT_ENDS_MM[1] + THICKEST_MM + reach_mm
     }
 
-    /// Thickness of the cortex at a point of the bone, whose cortex is `shell_mm` thick away from joints, by the sum of the signed
+    /// Thickness of the cortex at a point of the bone, which is `shell_mm` away from joints. `apart_mm` is the sum of the signed
     /// distances to both bones: on lines across a joint it is the gap.
     pub(super) fn cortex_mm(&self, p: &Point3<f64>, shell_mm: f64, apart_mm: f64) -> f64 {
         let [whole, none] = JOINT_ENDS_MM.map(|mm| self.gap_mm + mm);
@@ -60,7 +60,7 @@ impl JointSurface {
     }
 }
 
-/// Whether a point at this signed distance to the surface of a bone lies within `reach_mm` of what a plate may fill.
+/// Whether a point at this signed distance to the surface of a bone is within `reach_mm` of the deepest possible plate.
 pub(super) fn plate_near(distance_mm: f64, reach_mm: f64) -> bool {
     distance_mm > -(THICKEST_MM + reach_mm)
 }

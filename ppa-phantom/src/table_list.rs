@@ -2,10 +2,10 @@
 
 use serde::de::{Deserialize, Deserializer, Error};
 
-/// A list of exactly `N` entries, where serde alone would drop further ones.
+/// Deserialises a list of exactly `N` entries, where serde alone would ignore further ones.
 ///
 /// # Errors
-/// The length found and the one expected.
+/// States the length found and the one expected.
 pub(super) fn exactly<'de, D, T, const N: usize>(list: D) -> Result<[T; N], D::Error>
 where
     D: Deserializer<'de>,

@@ -1,4 +1,4 @@
-//! Measurements of the phantoms, on their shapes and in their voxels.
+//! Tests of the phantoms, on their shapes and in their voxels.
 
 mod anatomy;
 mod apart;
@@ -52,7 +52,7 @@ impl LowerLeg {
     }
 }
 
-/// Lattice over a right limb, `step_mm` apart, off the symmetry planes.
+/// Lattice over a right limb, `step_mm` apart, not aligned with the symmetry planes.
 fn lattice(limb: &Limb, step_mm: f64) -> impl Iterator<Item = Point3<f64>> + use<> {
     let (low, high) = limb.skin_box();
     let count = ((high - low) / step_mm).map(|n| n as usize);

@@ -1,8 +1,8 @@
 //! Texture of spongy bone: a random field whose spectrum is that of trabecular bone in radiographs.
 //!
-//! The field is a sum of octaves, each twice as coarse as the one before: random numbers at the points of a lattice, joined by
-//! quadratic B-splines. An octave is flat in frequency up to about a quarter of a wave per cell and falls off
-//! quickly beyond, so that the sum falls by a power law between the corners of the finest and of the coarsest octave. A
+//! The field is a sum of octaves, each twice as coarse as the previous one: random numbers at the points of a lattice, joined by
+//! quadratic B-splines. The spectrum of an octave is flat up to about a quarter of a wave per cell and falls off
+//! quickly beyond, so that the sum follows a power law between the corners of the finest and of the coarsest octave. A
 //! projection keeps the exponent (projection-slice theorem).
 
 use std::array;
@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Point3, Rotation3};
 
 use super::draw::{Purpose, Stream};
 
-/// Octaves: with trabeculae 0.7 mm apart their cells are 0.2 to 4 mm.
+/// Number of octaves: with trabeculae 0.7 mm apart their cells are 0.2 to 4 mm.
 const OCTAVES: usize = 5;
 /// Cell of the finest octave over the distance between neighbouring trabeculae: the field then has one maximum per
 /// distance along a line across the trabeculae.
@@ -23,14 +23,14 @@ const COARSER: f64 = 0.7;
 /// One octave of the field.
 #[derive(Debug, Clone)]
 struct Octave {
-    /// Lattices of different octaves are turned against each other and against the bone, so that no direction shows.
+    /// Lattices of different octaves are rotated relative to each other and to the bone, so that no direction stands out.
     lattice_from_place: Matrix3<f64>,
     numbers: Stream,
 }
 
-/// A random field with mean 0, another one for every seed.
+/// A random field with mean 0, different for every seed.
 ///
-/// Places and widths are counted in distances between trabeculae: across them twice, then along them.
+/// Positions and widths are in units of the distance between trabeculae: across them twice, then along them.
 #[derive(Debug, Clone)]
 pub(super) struct Texture {
     octaves: [Octave; OCTAVES],
@@ -55,7 +55,7 @@ impl Texture {
         }
     }
 
-    /// The field as a voxel of this width around a place shows it. Its variance is [`variance_seen`].
+    /// The mean of the field over a voxel of this width. Its variance is [`variance_seen`].
     pub(super) fn at(&self, place: &Point3<f64>, width: [f64; 3]) -> f64 {
         let octaves = self.octaves.iter().enumerate();
         octaves
@@ -64,7 +64,7 @@ impl Texture {
     }
 }
 
-/// Variance of the field as voxels of this width show it; 1 at points.
+/// Variance of the field averaged over voxels of this width; 1 at points.
 pub(super) fn variance_seen(width: [f64; 3]) -> f64 {
     (0..OCTAVES).map(|n| octave_variance(n, width)).sum()
 }
@@ -73,7 +73,7 @@ fn cell(octave: usize) -> f64 {
     FINEST_CELL * (1_u32 << octave) as f64
 }
 
-/// Share of an octave in the variance of the field at points, times what is left of it in means over voxels.
+/// Share of an octave in the variance of the field at points, times the fraction that remains in means over voxels.
 ///
 /// The kernel of an octave has a variance of a quarter of a cell squared along each axis, which a voxel raises by a twelfth of its
 /// width squared; white noise loses as much variance as its kernel gains width.

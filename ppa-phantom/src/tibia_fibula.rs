@@ -1,4 +1,4 @@
-//! Distal tibia and fibula, whose joint surfaces are cut concentric with the talus.
+//! Distal tibia and fibula, with joint surfaces cut concentric with the talus.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,9 +13,9 @@ use super::smooth::smooth_step;
 use super::tibia_fibula_table::{TIBIA_FIBULA, TibiaSection};
 use super::trabeculae::Trabeculae;
 
-/// Half the distance between the places where the front and the back of the syndesmosis are measured.
+/// Half the distance between the points where the front and the back of the syndesmosis are measured.
 const SYNDESMOSIS_REACH_MM: f64 = 6.0;
-/// The corner at the floor of the incisura moves by so much per mm of depth, since the grown polygon rounds it.
+/// Shift of the corner at the floor of the incisura per mm of depth, since the grown polygon rounds it.
 const INCISURA_FLOOR: f64 = 1.0;
 
 /// Profile of cortex and marrow along the leg.
@@ -40,20 +40,20 @@ fn shaft(p: &Parameters, knots: &[(f64, f64, f64)]) -> Filling {
     }
 }
 
-/// Heights in P01 at which the thickness of the cortex of the tibia is meant.
+/// Heights in P01 at which the thickness of the tibial cortex is defined.
 pub(super) const CORTEX_LEVELS_MM: [f64; 3] = [25.0, 100.0, 200.0];
 
-/// Thickness of the cortex over P01's: metaphysis, distal third, middle of the shaft.
+/// Thickness of the cortex relative to P01: metaphysis, distal third, middle of the shaft.
 fn cortex_shares(p: &Parameters) -> [f64; 3] {
     std::array::from_fn(|level| p.tibia_cortex_mm[level] / P01.tibia_cortex_mm[level])
 }
 
-/// How much of a shift at the joint is left at a station.
+/// Fraction of a shift at the joint that remains at a station.
 fn share_of_shift(station: f64) -> f64 {
     smooth_step(50.0, 8.0, station)
 }
 
-/// Corners of a section of a tibia as wide as the trochlea asks for, with its incisura.
+/// A section of a tibia that matches the width of the trochlea, with its incisura.
 fn tibia_section(p: &Parameters, section: &TibiaSection) -> Section {
     let share = share_of_shift(section.station);
     let mut corners = section.corners;
@@ -68,12 +68,12 @@ fn tibia_section(p: &Parameters, section: &TibiaSection) -> Section {
     Section::polygon(section.station, &corners, section.round)
 }
 
-/// How much shallower the incisura is than in P01.
+/// Reduction of the depth of the incisura relative to P01.
 fn shallower_mm(p: &Parameters) -> f64 {
     P01.incisura_depth_mm - p.incisura_depth_mm
 }
 
-/// Where the fibula lies further out than in P01: all of it with the trochlea's width, and
+/// Outward shift of the fibula relative to P01: all of it with the trochlea's width, and
 /// above the malleolus with the space of the syndesmosis.
 fn fibula_shift_mm(p: &Parameters, station: f64) -> f64 {
     let mean = |[front, back]: [f64; 2]| 0.5 * (front + back);
@@ -81,8 +81,8 @@ fn fibula_shift_mm(p: &Parameters, station: f64) -> f64 {
     share_of_shift(station) * p.lateral_shift_mm() + smooth_step(-4.0, 8.0, station) * wider
 }
 
-/// The space that the fibula keeps from the tibia: what is measured [`SYNDESMOSIS_REACH_MM`] in front of and behind the
-/// shaft, even between, and no more or less beyond.
+/// Joint space between fibula and tibia: the measured values [`SYNDESMOSIS_REACH_MM`] in front of and behind the shaft,
+/// interpolated linearly between and constant beyond.
 fn syndesmosis(p: &Parameters, mortise: &Mortise) -> Gap {
     let [front, back] = p.syndesmosis_mm;
     let posterior = mortise.limb_from_mortise * Vector3::y();
@@ -95,7 +95,7 @@ fn syndesmosis(p: &Parameters, mortise: &Mortise) -> Gap {
 
 /// Shaft, flare, plafond and medial malleolus.
 ///
-/// `flexion` is the motion of the talus, to whose facets the malleoli are cut.
+/// `flexion` is the motion of the talus; the malleoli are cut to its facets.
 pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talus: usize) -> Bone {
     let sections = TIBIA_FIBULA
         .tibia
@@ -116,7 +116,7 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
         5.0,
         vec![
             Shape::Loft(Box::new(shaft_and_flare)),
-            // Anterior and, higher, posterior colliculus.
+            // Anterior colliculus, and the posterior one above it.
             Shape::round_cone(
                 at(17.5 + shift, -4.0, 8.0),
                 8.0,
@@ -141,7 +141,7 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
             ),
         ],
     );
-    // The tubercles beside the fibula end at the joint line, while the lips in front and behind reach lower.
+    // The tubercles next to the fibula end at the joint line, while the lips in front and behind extend lower.
     let below_tubercles = mortise.wall(
         [-0.45, 0.0, -0.89],
         [-14.0 - p.lateral_shift_mm(), 0.0, -3.0],
@@ -184,7 +184,7 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
     }
 }
 
-/// Shaft and lateral malleolus; `flexion` as for the tibia.
+/// Shaft and lateral malleolus; `flexion` as for [`tibia`].
 pub(super) fn fibula(
     p: &Parameters,
     mortise: &Mortise,

@@ -9,20 +9,20 @@ use super::table_list::exactly;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TibiaSection {
-    /// Above the joint centre.
+    /// Height above the joint centre.
     pub station: f64,
     /// (medial, posterior) of: anterolateral tubercle, front, anteromedial, posteromedial, back, posterolateral tubercle, floor of
     /// the fibular incisura.
     #[serde(deserialize_with = "exactly")]
     pub corners: [[f64; 2]; 7],
-    /// The radius by which the corners are grown.
+    /// Radius by which the polygon is grown.
     pub round: f64,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FibulaSection {
-    /// Above the joint centre.
+    /// Height above the joint centre.
     pub station: f64,
     /// (medial, posterior).
     pub centre: [f64; 2],

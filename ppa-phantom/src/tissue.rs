@@ -1,6 +1,6 @@
 //! Tissues of a limb.
 
-/// What a point of the phantom consists of.
+/// Tissue at a point of the phantom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Tissue {

@@ -1,4 +1,4 @@
-//! How far apart trabeculae are in a bone, and how they run.
+//! Spacing and direction of the trabeculae in a bone.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 
@@ -9,15 +9,15 @@ use super::texture::variance_seen;
 pub(super) const MARROW_HU: f64 = -40.0;
 /// HU of the tissue of trabeculae, of about 2 g/cm³; assumed.
 const TRABECULA_HU: f64 = 1960.0;
-/// Voxels in which the texture has the standard deviation of the parameters, mm.
+/// Size of the voxels for which the standard deviation of the texture is specified, mm.
 const TEXTURE_VOXEL_MM: f64 = 0.8;
 
-/// Lines that trabeculae follow.
+/// Lines along which trabeculae run.
 #[derive(Debug, Clone)]
 enum Course {
     /// Parallel to the third local axis.
     Straight,
-    /// Around the first local axis; the second one points to the middle of the bone, this far away.
+    /// Around the first local axis; the second one points to the middle of the bone, at this distance.
     Arcs { radius_mm: f64 },
 }
 
@@ -27,9 +27,9 @@ pub(super) struct Trabeculae {
     course: Course,
     origin: Point3<f64>,
     local_from_limb: Rotation3<f64>,
-    /// From a trabecula to the next one.
+    /// Distance from one trabecula to the next.
     distance_mm: f64,
-    /// Mean intercept along the trabeculae over that across them.
+    /// Mean intercept along the trabeculae divided by that across them.
     anisotropy: f64,
 }
 
@@ -49,13 +49,13 @@ impl Trabeculae {
     pub(super) fn along(self, direction: &Unit<Vector3<f64>>) -> Self {
         let turn = Rotation3::rotation_between(direction, &Vector3::z_axis());
         Self {
-            // There is none for a half turn only, which changes no course.
+            // Undefined only for a half turn, which changes no course.
             local_from_limb: turn.unwrap_or_else(Rotation3::identity),
             ..self
         }
     }
 
-    /// The same on circles around an axis through a point, in a bone with its middle at another one.
+    /// The same on circles around an axis through a point; another point is the middle of the bone.
     pub(super) fn around(
         self,
         centre: Point3<f64>,
@@ -77,7 +77,7 @@ impl Trabeculae {
         }
     }
 
-    /// The trabeculae of a bone at another place, size and orientation; they stay as far apart.
+    /// The trabeculae of a bone at another place, size and orientation; their spacing is unchanged.
     pub(super) fn placed(&self, to: &Placement) -> Self {
         let course = match self.course {
             Course::Straight => Course::Straight,
@@ -94,7 +94,7 @@ impl Trabeculae {
         }
     }
 
-    /// A point across the trabeculae, twice, and along them, in distances between them.
+    /// Coordinates of a point across the trabeculae, twice, and along them, in units of their distance.
     pub(super) fn place(&self, p: &Point3<f64>) -> Point3<f64> {
         let q = self.local_from_limb * (p - self.origin);
         let [a, b, along] = match self.course {
@@ -111,12 +111,12 @@ impl Trabeculae {
         [across, across, across / self.anisotropy]
     }
 
-    /// What makes the standard deviation of the texture 1 in voxels of [`TEXTURE_VOXEL_MM`].
+    /// Factor that makes the standard deviation of the texture 1 in voxels of [`TEXTURE_VOXEL_MM`].
     pub(super) fn gain(&self) -> f64 {
         variance_seen(self.width(TEXTURE_VOXEL_MM)).sqrt().recip()
     }
 
-    /// From a trabecula to the next one, mm.
+    /// Distance from one trabecula to the next, mm.
     #[cfg(test)]
     pub(super) fn distance_mm(&self) -> f64 {
         self.distance_mm

@@ -8,32 +8,32 @@ use super::lower_leg_skin::toe_tip;
 use super::sdf::Plane;
 use super::tibia_fibula::CORTEX_LEVELS_MM;
 
-/// Heights in P01 at which the girths of ankle and calf are meant.
+/// Heights in P01 at which the girths of ankle and calf are defined.
 const GIRTH_LEVELS_MM: [f64; 2] = [75.0, 220.0];
 
-/// Numbers that a measurement on the voxelised phantom should find; `ct` frame, mm and radians.
+/// Expected results of measurements on the voxelised phantom; `ct` frame, mm and radians.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Truth {
     /// Middle of the joint space between trochlea and plafond, both without the groove in the middle of the trochlea (1 mm deep in P01);
-    /// with the groove the middle lies lower by less than that.
+    /// with the groove the middle is lower by less than that.
     pub joint_centre: Point3<f64>,
     /// Direction of the tibial shaft towards the knee.
     ///
-    /// A line through the centres of whole slices of the leg leans about 6° further back, since the calf lies
+    /// A line through the centres of full slices of the leg leans about 6° further back, since the calf is
     /// behind the tibia.
     pub axis_direction: Unit<Vector3<f64>>,
-    /// Axis about which the talus turns in the mortise, towards its medial end.
+    /// Axis about which the talus rotates in the mortise, towards its medial end.
     pub talocrural_axis: Unit<Vector3<f64>>,
     /// Centre of the trochlea on the talocrural axis.
     pub talocrural_centre: Point3<f64>,
-    /// Internal rotation about the tibial shaft that turns both malleoli parallel to the detector.
+    /// Internal rotation about the tibial shaft at which both malleoli are parallel to the detector.
     pub mortise_angle_rad: f64,
-    /// Across the shaft from the joint towards the focal spot of that view: the front of the mortise.
+    /// Direction perpendicular to the shaft from the joint towards the focal spot of that view: the front of the mortise.
     pub mortise_direction: Unit<Vector3<f64>>,
-    /// Internal rotation at which rays run along the medial gutter.
+    /// Internal rotation at which rays are parallel to the medial gutter.
     pub medial_gutter_angle_rad: f64,
-    /// Internal rotation at which rays run along the lateral gutter.
+    /// Internal rotation at which rays are parallel to the lateral gutter.
     pub lateral_gutter_angle_rad: f64,
     /// Bony gap between trochlea and plafond.
     pub superior_gutter_mm: f64,
@@ -47,13 +47,13 @@ pub struct Truth {
     pub medial_malleolus_mm: f64,
     /// Reach of the lateral malleolus below the joint centre, along the shaft.
     pub lateral_malleolus_mm: f64,
-    /// Plane under the limb, which heel and calf touch: y of the table top.
+    /// y of the table top, which heel and calf touch.
     pub back_plane_y_mm: f64,
     /// The most anterior point of the skin: the tip of the longest toe.
     pub toe_tip: Point3<f64>,
-    /// From the back of the heel to the tip of the longest toe, along y.
+    /// Distance from the back of the heel to the tip of the longest toe, along y.
     pub foot_length_mm: f64,
-    /// From the joint centre to the sole, along the shaft.
+    /// Distance from the joint centre to the sole, along the shaft.
     pub sole_depth_mm: f64,
     /// Thickness of the skin.
     pub skin_mm: f64,
@@ -69,9 +69,9 @@ pub struct Truth {
     pub tibia_cortex_mm: [[f64; 2]; 3],
     /// Hounsfield units of spongy bone in the distal tibia, away from its surface.
     pub trabecular_hu: f64,
-    /// How far the heads of metatarsals I, III, IV and V lie in front of that of II, along the foot.
+    /// Distance of the heads of metatarsals I, III, IV and V in front of that of II, along the foot.
     pub metatarsal_heads_mm: [f64; 4],
-    /// Turn of the foot about the talocrural axis from a right angle with the leg, toes down.
+    /// Rotation of the foot about the talocrural axis from a right angle with the leg, toes down.
     pub plantarflexion_rad: f64,
     /// Lean of the heel's lower end away from the midline.
     pub heel_valgus_rad: f64,
@@ -80,7 +80,7 @@ pub struct Truth {
 }
 
 impl LowerLeg {
-    /// The numbers that a measurement on the voxelised phantom should find.
+    /// Returns the expected results of measurements on the voxelised phantom.
     pub fn truth(&self) -> Truth {
         Truth::of(self)
     }
@@ -132,7 +132,7 @@ impl Truth {
     }
 }
 
-/// Internal rotation at which rays run along a facet; `side` is 1 for the medial and -1 for the lateral one.
+/// Internal rotation at which rays are parallel to a facet; `side` is 1 for the medial and -1 for the lateral one.
 fn gutter_angle_rad(facet: &Plane, side: f64) -> f64 {
     -(side * facet.normal.y).atan2(side * facet.normal.x)
 }

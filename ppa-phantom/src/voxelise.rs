@@ -1,4 +1,4 @@
-//! From shapes to Hounsfield units on a lattice, with partial volume.
+//! Conversion of shapes to Hounsfield units on a lattice, with partial volume.
 
 use nalgebra::{Point3, Vector3};
 use ppa_core::Side;
@@ -15,23 +15,23 @@ use super::limb::Limb;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PhantomError {
-    /// The spacing is not a number between the finest and the coarsest that make sense.
+    /// The spacing is not a number in the supported range.
     #[error("voxels of {found_mm} mm, expected {} to {} mm", SPACING_MM[0], SPACING_MM[1])]
     Spacing {
         /// Spacing asked for, mm.
         found_mm: f64,
     },
-    /// Blur or noise of a scanner make no sense.
+    /// Blur or noise of a scanner outside the supported range.
     #[error("{what} of {found}, expected 0 to {most}")]
     Scanner {
-        /// Which of both.
+        /// Name of the invalid quantity.
         what: &'static str,
-        /// Asked for.
+        /// Value asked for.
         found: f64,
-        /// Largest that makes sense.
+        /// Largest supported value.
         most: f64,
     },
-    /// The lattice or its values were refused.
+    /// The lattice or its values are invalid.
     #[error(transparent)]
     Volume(#[from] VolumeError),
 }
@@ -41,35 +41,35 @@ pub enum PhantomError {
 pub enum TableTop {
     /// Only the limb, in air.
     Absent,
-    /// A flat sandwich of carbon fibre and foam, 30 mm thick, which heel and calf touch; it leaves the
+    /// A flat sandwich of carbon fibre and foam, 30 mm thick, which heel and calf touch; it extends beyond the
     /// field of view on four sides.
     Present,
 }
 
 const SPACING_MM: [f64; 2] = [0.25, 8.0];
-/// Most voxels of a phantom: 2 GiB of values. A lower leg has as many at 0.4 mm.
+/// Largest number of voxels of a phantom: 2 GiB of values, which a lower leg reaches at 0.4 mm.
 const MOST_VOXELS: f64 = 536_870_912.0;
 const AIR_HU: f64 = -1000.0;
-/// Air around the limb inside the field of view.
+/// Width of the air around the limb inside the field of view.
 const MARGIN_MM: f64 = 12.0;
-/// Thickness of the whole table top and of each of its two carbon sheets.
+/// Thickness of the complete table top and of each of its two carbon sheets.
 const TABLE_MM: f64 = 30.0;
 const TABLE_SHEET_MM: f64 = 2.0;
 const TABLE_SHEET_HU: f64 = -150.0;
 const TABLE_FOAM_HU: f64 = -940.0;
-/// Edge of the blocks that are ruled out as a whole, voxels.
+/// Edge of the blocks that are tested together, voxels.
 const BLOCK: usize = 4;
-/// Distances are estimates: trust them only within this factor.
+/// Safety factor: distances are estimates.
 const CAUTION: f64 = 1.3;
-/// Largest part of a voxel that counts as crossed by flat boundaries, mm; larger voxels are divided.
+/// Largest part of a voxel in which boundaries are taken as flat, mm; larger voxels are divided.
 const FLAT_MM: f64 = 1.0;
 
-/// How much of `y ± half` lies between `low` and `high`.
+/// Fraction of `y ± half` that is between `low` and `high`.
 fn share_between(y: f64, half: f64, low: f64, high: f64) -> f64 {
     (((y + half).min(high) - (y - half).max(low)) / (2.0 * half)).max(0.0)
 }
 
-/// Mean Hounsfield unit at height `y_mm` where there is no limb.
+/// Mean Hounsfield unit at height `y_mm` outside the limb.
 fn background_hu(y_mm: f64, half_mm: f64, table_top_mm: Option<f64>) -> f64 {
     let Some(top) = table_top_mm else {
         return AIR_HU;
@@ -85,16 +85,16 @@ fn background_hu(y_mm: f64, half_mm: f64, table_top_mm: Option<f64>) -> f64 {
 }
 
 impl Limb {
-    /// The phantom as a CT with isotropic voxels, axes along LPS.
+    /// Returns the phantom as a CT with isotropic voxels, axes along LPS.
     ///
-    /// The field of view holds the limb with some air around it, and cuts a leg at mid-calf.
-    /// Every tissue counts with its share of a voxel. The share follows from the distance to the boundary, taken as
-    /// flat; voxels above 1 mm that a boundary may cross are divided into parts first. The result does not
+    /// The field of view contains the limb with some air around it, and cuts a leg at mid-calf.
+    /// Every tissue contributes its share of a voxel. The share follows from the distance to the boundary, taken as
+    /// flat; voxels above 1 mm that a boundary may cross are first divided into parts. The result does not
     /// depend on the number of threads.
     ///
     /// # Errors
-    /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8, [`VolumeError::TooFine`] when it makes
-    /// more than 2^29 voxels, [`VolumeError::Memory`] when there is no room for them.
+    /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8, [`VolumeError::TooFine`] when it gives
+    /// more than 2^29 voxels, [`VolumeError::Memory`] when they do not fit in memory.
     pub fn voxelise(&self, spacing_mm: f64, table: TableTop) -> Result<Volume, PhantomError> {
         let (mut low, mut high) = self.skin_box();
         low -= Vector3::repeat(MARGIN_MM);
@@ -108,11 +108,11 @@ impl Limb {
         self.voxelise_right([low, high], spacing_mm, table)
     }
 
-    /// The part of the phantom in a world box (`ct`, mm), as [`Limb::voxelise`] makes it: the first voxel is centred
+    /// Returns the part of the phantom in a world box (`ct`, mm), as in [`Limb::voxelise`]: the first voxel is centred
     /// on the lowest corner; on a left limb on the corner that is highest in x and lowest in y and z.
     ///
     /// # Errors
-    /// As [`Limb::voxelise`]; [`PhantomError::Volume`] when the box is empty.
+    /// The same as [`Limb::voxelise`]; [`PhantomError::Volume`] when the box is empty.
     pub fn voxelise_box(
         &self,
         [low, high]: [Point3<f64>; 2],
@@ -164,7 +164,7 @@ impl Limb {
         Ok(Volume::new(mirrored.map_err(VolumeError::from)?, hu)?)
     }
 
-    /// Fills in one value per voxel of a lattice in the right limb's `ct`.
+    /// Computes one value per voxel of a lattice in the right limb's `ct`.
     fn paint_on(&self, grid: &Grid, spacing_mm: f64, table: TableTop, hu: &mut [f32]) {
         let table_top_mm = match table {
             TableTop::Absent => None,
@@ -269,7 +269,7 @@ impl Painter<'_> {
         if parts == 1 || !limb.boundary_near(&p, local, reach_mm) {
             return blend(limb.mixture(&p, near, local, self.spacing_mm));
         }
-        // Only what can change inside the voxel is measured again.
+        // Only distances that can change inside the voxel are measured again.
         let near_skin = local
             .skin_mm
             .is_some_and(|skin| skin > -(limb.envelope.cover_mm(&p) + reach_mm));

@@ -1,4 +1,4 @@
-//! `ppa calibrate`: how far the predictions of trained networks can be trusted.
+//! `ppa calibrate`: calibrates the prediction intervals of trained networks.
 
 use std::path::PathBuf;
 

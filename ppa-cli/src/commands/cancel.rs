@@ -1,4 +1,4 @@
-//! `ppa cancel`: ends the jobs of a folder.
+//! `ppa cancel`: cancels the jobs of a folder.
 
 use std::path::PathBuf;
 

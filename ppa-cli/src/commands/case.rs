@@ -33,12 +33,12 @@ pub struct CheckArgs {
 
 #[derive(Debug, Serialize)]
 struct Checked {
-    /// Whether the case can be used: it can be carried out, and no severe finding is open.
+    /// Whether the case can be used: no severe finding is open.
     usable: bool,
     joint_mm: [f64; 3],
     axis: [f64; 3],
     findings: Vec<Finding>,
-    /// Since the case was written; null if the file holds no landmarks that can be compared.
+    /// Changes since the case was written; null if the file has no landmarks to compare.
     changed: Option<Drift>,
 }
 

@@ -1,4 +1,4 @@
-//! `ppa ct`: look at, convert or make a CT.
+//! `ppa ct`: inspect, convert or make a CT.
 
 mod convert;
 mod info;

@@ -1,4 +1,4 @@
-//! `ppa dataset`: datasets in the published layouts, ours or the authors'.
+//! `ppa dataset`: datasets in the published layouts, by this program or the authors.
 
 mod check;
 mod convert;

@@ -106,7 +106,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-/// Phantom, case and plan, as files that the other commands take as well.
+/// Writes phantom, case and plan as files that other commands accept too.
 fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
     let working = working("voxelising the phantom");
     let volume = leg.voxelise(SPACING_MM, TableTop::Present)?;
@@ -138,13 +138,13 @@ fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
     Ok(Plan::read(&file)?)
 }
 
-/// Writes a file, unless it is there with the same bytes. Other bytes are kept, and refused, without `--replace`.
+/// Writes a file unless it already has the same contents. A file with other contents is refused without `--replace`.
 fn keep_or_write(
     path: &Path,
     replace: ReplaceArgs,
     write: impl FnOnce(&Path) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    // In the same folder, since a case names its scan from there.
+    // In the same folder, since a case names its scan relative to it.
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let new = path.with_file_name(format!(".new.{name}"));
     let written = write(&new).and_then(|()| {
@@ -154,7 +154,7 @@ fn keep_or_write(
         std::fs::rename(&new, path).with_context(|| format!("cannot write {}", path.display()))
     });
     if written.is_err() {
-        // What failed first is what counts.
+        // The first error is the one to report.
         let _ = std::fs::remove_file(&new);
     }
     written

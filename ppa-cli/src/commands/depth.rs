@@ -1,4 +1,4 @@
-//! `ppa depth`: depth images of meshes, and the camera model by itself.
+//! `ppa depth`: depth images of meshes, and the camera model.
 
 mod camera;
 mod coverage;

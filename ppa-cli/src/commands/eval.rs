@@ -49,7 +49,7 @@ pub struct EvalArgs {
     replace: ReplaceArgs,
 }
 
-/// Names of the charts, the last one where angles are known.
+/// Names of the charts; the last one exists only if angles are known.
 const CHARTS: [&str; 6] = [
     "learning_curve",
     "scatter",
@@ -111,7 +111,7 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     output.print(&evaluation, describe)
 }
 
-/// The charts in the order of [`CHARTS`].
+/// Draws the charts in the order of [`CHARTS`].
 fn draw_charts(log: &[LogRow], rows: &[Row], evaluation: &Evaluation) -> Vec<Chart> {
     let scalar = |tag: &str| {
         let rows = log.iter();

@@ -1,4 +1,4 @@
-//! `ppa generate`: the dataset of a plan.
+//! `ppa generate`: makes the dataset of a plan.
 
 use std::path::{Path, PathBuf};
 
@@ -90,7 +90,7 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     output.print(&summary, |s| describe(s, &out, "made"))
 }
 
-/// The folder beside a plan that is named after it.
+/// The folder next to the plan that is named after it.
 pub fn dataset_folder(plan: &Path) -> anyhow::Result<PathBuf> {
     let folder = plan.with_extension("");
     anyhow::ensure!(
@@ -101,7 +101,7 @@ pub fn dataset_folder(plan: &Path) -> anyhow::Result<PathBuf> {
     Ok(folder)
 }
 
-/// Generates and shows the progress.
+/// Generates a dataset and shows the progress.
 pub fn with_progress(
     plan: &Plan,
     out: &Path,
@@ -111,14 +111,14 @@ pub fn with_progress(
 ) -> anyhow::Result<Summary> {
     let summary = generate(plan, out, settings, &|progress| watch.report(progress));
     if let Ok(summary) = &summary {
-        // Some are found in the poses.
+        // Some findings appear only while poses are made.
         watch.report(Progress::Findings(&summary.findings));
     }
     watch.finish();
     interrupt.or_how(summary, || watch.how_to_resume())
 }
 
-/// The summary in words; `done` is what was done to the poses that were not there yet.
+/// Describes the summary; `done` is the verb for the poses that were missing.
 pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
     let mut text = format!(
         "{}: {} and {} of {}, {} of them {done} now",
@@ -141,7 +141,7 @@ pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
     text + &listed("set aside", &summary.set_aside)
 }
 
-/// What was done to files, with the first of them.
+/// Describes what was done to files and names the first of them.
 fn listed(done: &str, files: &[String]) -> String {
     const TOLD: usize = 5;
     if files.is_empty() {

@@ -1,4 +1,4 @@
-//! `ppa label`: the quality of poses.
+//! `ppa label`: labels of pose quality.
 
 mod agree;
 mod auto;

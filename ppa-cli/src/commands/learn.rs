@@ -91,8 +91,8 @@ pub fn run(command: &LearnCommand, output: Output) -> anyhow::Result<()> {
     }
 }
 
-/// The network in a training's folder or of a weight file, what was not taken unchanged, and the metadata; refused if it is for the
-/// other camera than `camera`.
+/// Opens the network of a training run's folder or of a weight file; also returns what was not loaded unchanged, and the metadata. Refuses
+/// a network for the other camera than `camera`.
 fn open(
     path: &Path,
     camera: Option<View>,
@@ -114,7 +114,7 @@ fn open(
     Ok((network, loaded, WeightsMetadata::read(path)?))
 }
 
-/// What was not taken from two files as it stood.
+/// Joins the lists of what was not loaded unchanged from two files.
 fn both(left: Loaded, right: Loaded) -> Loaded {
     let named = |camera: &str, names: Vec<String>| -> Vec<String> {
         let names = names.into_iter();
@@ -191,7 +191,7 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-/// By name, what was not taken from a weight file, or nothing.
+/// Lists what was not loaded from a weight file by name; empty if everything was.
 pub fn not_taken(kept: &[String], unused: &[String]) -> String {
     let mut text = String::new();
     for (what, names) in [("new instead", kept), ("not used", unused)] {

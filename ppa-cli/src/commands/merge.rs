@@ -1,4 +1,4 @@
-//! `ppa merge`: the shards of a plan as one dataset.
+//! `ppa merge`: joins the shards of a plan to one dataset.
 
 use std::path::PathBuf;
 

@@ -140,7 +140,7 @@ impl Surface {
     }
 }
 
-/// A body shape, and how far it is from the skin of the scan.
+/// A body shape, and its distance from the skin of the scan.
 #[derive(Debug, Serialize)]
 struct Variant {
     #[serde(flatten)]

@@ -41,7 +41,7 @@ use serde::de::DeserializeOwned;
 
 /// Reads the rows of a CSV file with a header line.
 fn read_csv<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
-    // Read whole: to `csv` a header that cannot be read is an empty table.
+    // Read completely first: `csv` treats a header that cannot be read as an empty table.
     let bytes = ppa_core::regular_file::read(path)
         .with_context(|| format!("cannot read {}", path.display()))?;
     let rows = csv::Reader::from_reader(&bytes[..])

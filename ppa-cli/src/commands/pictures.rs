@@ -1,8 +1,8 @@
-//! Pictures written beside the results of commands.
+//! Pictures written next to the results of commands.
 
 use std::path::Path;
 
-/// The name of a file without its folders, which may say who the patient is.
+/// Name of a file without its folders, which may identify the patient.
 pub fn shown_name(path: &Path) -> String {
     path.file_name()
         .unwrap_or_default()

@@ -62,7 +62,7 @@ struct Estimate {
     #[serde(flatten)]
     forecast: Forecast,
     threads: usize,
-    /// On threads that have a core each.
+    /// With one core per thread.
     wall_hours: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     cluster: Option<Makespan>,
@@ -129,11 +129,11 @@ fn forecast_of(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<(
         forecast,
     };
     output.print(&estimate, describe)?;
-    // What was measured is reported even then.
+    // The measurements are reported even if the dataset does not fit.
     Ok(estimate.forecast.fits(&root)?)
 }
 
-/// The plan as `ppa submit` would divide it; `resumes` as in [`PoseCost`].
+/// Divides the plan as `ppa submit` would; `resumes` as in [`PoseCost`].
 fn on_cluster(forecast: &Forecast, resumes: bool, size: &ClusterSize) -> anyhow::Result<Makespan> {
     let cost = PoseCost {
         pose_cpu_s: forecast.cpu_s_per_unit,

@@ -112,7 +112,7 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
     ended.map_err(anyhow::Error::from).and(report)
 }
 
-/// Prints an answer, or names on stderr what was skipped; the stream ends once nobody listens any more.
+/// Prints an answer, or reports a skipped pair on stderr; ends the stream when the reader has closed it.
 fn print(answer: Result<StreamAnswer, SkippedPair>) -> io::Result<ControlFlow<()>> {
     let answer = match answer {
         Ok(answer) => answer,

@@ -1,4 +1,4 @@
-//! `ppa prepare`: find skin, axis and plane of a limb and write them down as a case.
+//! `ppa prepare`: finds skin, axis and plane of a limb and writes them as a case.
 
 use std::path::PathBuf;
 

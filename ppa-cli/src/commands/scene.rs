@@ -40,7 +40,7 @@ pub struct WhichRoom {
 }
 
 impl WhichRoom {
-    /// Whether one was chosen.
+    /// Whether a room was chosen.
     pub fn is_given(&self) -> bool {
         self.plan.is_some() || self.file.is_some()
     }
@@ -166,7 +166,7 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
     }
     let Table { room, plane } = table;
     match room.points_and_triangles() {
-        // An STL file has no points beside its triangles: refused as for a cloud.
+        // An STL file cannot hold points in addition to triangles: refused as for a cloud.
         Some(mesh) if !is_stl(&args.out) => write_mesh_file(&args.out, &mesh)?,
         _ => write_cloud_file(&args.out, &room.cloud)?,
     }

@@ -41,7 +41,7 @@ pub fn run(args: &StatusArgs, output: Output) -> anyhow::Result<()> {
     }
 }
 
-/// Reports the shards of a plan on a cluster, and says whether any of them runs or waits.
+/// Reports the shards of a plan on a cluster, and returns whether any of them is running or waiting.
 fn jobs(root: &Path, output: Output) -> anyhow::Result<bool> {
     let folder = ClusterFolder::open(root)?;
     let submission = Submission::read(&folder.submission())?;

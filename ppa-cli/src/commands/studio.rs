@@ -80,7 +80,7 @@ impl StudioArgs {
         }))
     }
 
-    /// The folder or file that the page is about; the built-in phantom lies in the working folder.
+    /// The folder or file shown by the page; the built-in phantom is in the working folder.
     fn shown(&self) -> &Path {
         let shown = self.path.as_ref().or(self.watch.as_ref());
         shown.map_or(Path::new("."), PathBuf::as_path)
@@ -133,14 +133,14 @@ pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
     let (stop, stopped) = channel();
     std::thread::spawn(move || {
         signals.forever().next();
-        // Dropped, it ends the service.
+        // Dropping it ends the service.
         drop(stop);
     });
     serve(studio, listener, stopped)?;
     Ok(())
 }
 
-/// Opens the page in the person's browser, where there is one; the address is printed in any case.
+/// Opens the page in the user's browser, if there is one; the address is printed in any case.
 fn open_browser(address: &str) {
     let opener = if cfg!(target_os = "macos") {
         "open"

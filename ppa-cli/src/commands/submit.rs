@@ -1,4 +1,4 @@
-//! `ppa submit`: a plan, a plan of experiments, or the histories of a command as jobs of a cluster.
+//! `ppa submit`: submits a plan, a plan of experiments, or the histories of a command as jobs of a cluster.
 
 mod divisible_command;
 mod division;
@@ -26,7 +26,7 @@ use crate::stderr;
 use division::{Input, submission};
 use histories::damaged_tally;
 
-/// Tasks below this are mostly start-up for the scheduler, seconds.
+/// Duration below which tasks are mostly start-up for the scheduler, seconds.
 const SHORT_S: f64 = 20.0 * 60.0;
 
 #[derive(Debug, Subcommand)]
@@ -119,7 +119,7 @@ pub struct SlurmArgs {
 #[derive(Debug, Serialize)]
 struct Submitted {
     folder: PathBuf,
-    /// Tasks: shards, trainings or parts.
+    /// Number of tasks: shards, training runs or parts.
     shards: u64,
     #[serde(flatten)]
     poses: Option<SubmittedPoses>,
@@ -127,13 +127,13 @@ struct Submitted {
     histories: Option<SubmittedHistories>,
     max_array_size: u64,
     dry_run: bool,
-    /// Name of the work of a task.
+    /// Name of a task.
     #[serde(skip)]
     task: &'static str,
-    /// Tasks that are not done, or whose shards are damaged, and that have no job.
+    /// Tasks without a job that are unfinished or whose shards are damaged.
     submitted: Vec<u64>,
     commands: Vec<String>,
-    /// Of the commands, in their order.
+    /// Job identifiers of the commands, in the same order.
     jobs: Vec<String>,
 }
 
@@ -143,7 +143,7 @@ struct SubmittedPoses {
     poses: u64,
     cpu_s_per_unit: f64,
     cost_source: CostSource,
-    /// Estimated time of the largest shard.
+    /// Estimated time of the largest shard, seconds.
     task_s: f64,
 }
 
@@ -170,9 +170,9 @@ impl SubmittedPoses {
 
 #[derive(Debug, Serialize)]
 struct SubmittedHistories {
-    /// Of all projections.
+    /// Total over all projections.
     histories: u64,
-    /// As it was measured; absent where --tasks was given.
+    /// As measured; absent if --tasks was given.
     cpu_s_per_million: Option<f64>,
 }
 
@@ -254,7 +254,7 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     }
     let chunks = split(&lost, max_array_size);
     let arrays = task_commands(&folder, &submission, &chunks)?;
-    // Outputs of a command are the user's once they are written.
+    // Outputs of a command belong to the user once they are written.
     let is_over =
         matches!(submission.work, Work::Histories(_)) && report.merge.state == ShardState::Done;
     let has_no_last = matches!(report.merge.state, ShardState::Failed | ShardState::Missing);
@@ -284,7 +284,7 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
             submission.write(&folder.submission())?;
         }
     }
-    // Without limit all arrays may run at once; with one, each waits for the one before.
+    // Without a limit all arrays may run at once; with one, each waits for the previous one.
     let one_by_one = submission.settings.max_tasks.is_some();
     let mut queued = Queueing {
         dry_run: args.dry_run,
@@ -306,7 +306,7 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     output.print(&submitted, describe)
 }
 
-/// Tasks without a job whose files are not as they were made. Damaged tallies are renamed, but not in a dry run.
+/// Tasks without a job whose files are damaged. Damaged tallies are renamed, but not in a dry run.
 fn damaged(
     folder: &ClusterFolder,
     report: &ClusterReport,
@@ -322,13 +322,13 @@ fn damaged(
         let number = shard.shard;
         let problem = match work {
             Work::Histories(_) => damaged_tally(&folder.part(number), !dry_run)?,
-            // A shard that is not done is made again anyway.
+            // An unfinished shard is repeated anyway.
             _ if shard.report.state != ShardState::Done => None,
             Work::Poses(work) => {
                 let found = check(&folder.shard(work, number))?;
                 found.problems.first().map(ToString::to_string)
             }
-            // --check is refused for trainings.
+            // --check is refused for training runs.
             Work::Trainings(_) => None,
         };
         if let Some(problem) = problem {
@@ -359,7 +359,7 @@ impl Queueing<'_> {
     }
 }
 
-/// Jobs of earlier submissions that the last one must wait for: arrays, and another last one that runs.
+/// Identifiers of jobs of earlier submissions that the last job must wait for: arrays, and another last job that is running.
 fn waits_for(queue: &[QueuedJob]) -> Vec<String> {
     let counts = |job: &&QueuedJob| job.kind != JobKind::Merge || !job.is_pending();
     let ids = queue.iter().filter(counts).map(QueuedJob::array_id);
@@ -369,7 +369,7 @@ fn waits_for(queue: &[QueuedJob]) -> Vec<String> {
     ids
 }
 
-/// A last job that waits for earlier tasks alone would find results missing.
+/// Cancels last jobs that wait only for earlier tasks: they would find results missing.
 fn cancel_waiting_last(queue: &[QueuedJob]) -> anyhow::Result<()> {
     let waiting = queue
         .iter()

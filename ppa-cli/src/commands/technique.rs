@@ -29,7 +29,7 @@ impl TechniqueArgs {
         }
     }
 
-    /// In words.
+    /// Describes the technique.
     pub fn describe(&self) -> String {
         let named = |technique| Technique::ALL.into_iter().find(|(_, of)| *of == technique);
         match self.technique.and_then(named) {

@@ -1,4 +1,4 @@
-//! `ppa train`: a network from a configuration.
+//! `ppa train`: trains a network from a configuration.
 
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ struct Trained {
     step: u64,
     steps: u64,
     last_loss: Option<f32>,
-    /// What of the `start` file was not taken as it stood.
+    /// What was not loaded unchanged from the `start` file.
     start: Option<Loaded>,
 }
 
@@ -50,7 +50,7 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     bar.set_length(steps);
     let mut last_loss = None;
     let ended = train(&config, &args.out, interrupt.flag(), |progress| {
-        // Steps that an earlier run made took no time of this one.
+        // Steps of an earlier run are not part of the time of this one.
         if last_loss.is_none() {
             bar.suspend(|| {
                 note(&format!(

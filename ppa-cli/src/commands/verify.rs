@@ -85,7 +85,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-/// Fails with the first problems, in one sentence.
+/// Fails with the first problems in one sentence.
 pub fn require_none(dataset: &Path, problems: &[impl ToString]) -> anyhow::Result<()> {
     const TOLD: usize = 5;
     if problems.is_empty() {

@@ -1,6 +1,6 @@
 //! Random numbers addressed by (seed, purpose, index): the number at an address is the same no matter when, where and on which thread it is drawn.
 //!
-//! What a number is for, the purpose, is an enumeration of the crate that draws it.
+//! Each crate that draws numbers lists their purposes in an enumeration.
 
 mod philox;
 mod seed;

@@ -34,7 +34,7 @@ impl Philox {
         }
     }
 
-    /// The same generator with `block`, the block before the next, still to be drawn from; a vector loop may have computed it.
+    /// The same generator with `block`, the previous block, still to be drawn from; a vectorised loop may have computed it.
     #[inline]
     pub fn after(self, block: [u32; 4]) -> Self {
         Self {
@@ -50,7 +50,7 @@ impl Philox {
         [seed as u32, (seed >> 32) as u32]
     }
 
-    /// Number of the block after those used or begun.
+    /// Number of the block after those already used or started.
     #[inline]
     pub fn step(&self) -> u32 {
         self.counter[2]
@@ -70,7 +70,7 @@ impl Philox {
     /// Two independent standard normal numbers, at most 6.67 in size (Box and Muller, Ann. Math. Statist. 29 (1958) 610).
     #[inline]
     pub fn normals(&mut self) -> [f64; 2] {
-        // 1 − u lies in [2⁻³², 1], so the logarithm stays finite.
+        // 1 − u is in [2⁻³², 1], so the logarithm stays finite.
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
         [radius * cos, radius * sin]
@@ -141,7 +141,7 @@ mod tests {
         }
     }
 
-    /// Moments of 4e4 normal numbers, and the product of the two that come together, within 4.5 standard errors: 3e-5.
+    /// Moments of 4e4 normal numbers, and the mean product of the two of a pair, within 4.5 standard errors: 3e-5.
     #[test]
     fn normal_numbers_have_the_moments_of_the_normal_distribution() {
         let n = 20_000;

@@ -2,7 +2,7 @@
 
 use sha2::{Digest, Sha256};
 
-/// A seed for what an address names, such as `1/radiograph/0/r/36`: the first eight bytes of the SHA-256 of the text, little-endian.
+/// Returns the seed of an address such as `1/radiograph/0/r/36`: the first eight bytes of the SHA-256 of the text, little-endian.
 pub fn seed_of_address(address: &str) -> u64 {
     let digest = Sha256::digest(address.as_bytes());
     u64::from_le_bytes(std::array::from_fn(|byte| digest[byte]))

@@ -1,10 +1,10 @@
 //! SplitMix64: Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, OOPSLA 2014,
 //! doi:10.1145/2660193.2660195.
 
-/// The odd number next to 2⁶⁴ / golden ratio, by which the state of the generator grows.
+/// Increment of the generator's state: the odd number next to 2⁶⁴ / golden ratio.
 const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// The number that a generator in this state gives next: every bit of the state affects every bit of it.
+/// Returns the next number of a generator in this state: every bit of the state affects every bit of it.
 #[inline]
 pub fn split_mix(state: u64) -> u64 {
     let z = state.wrapping_add(GAMMA);
@@ -13,7 +13,7 @@ pub fn split_mix(state: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Number `index`, counted from 0, of the generator that starts in `state`.
+/// Returns number `index`, counted from 0, of the generator that starts in `state`.
 #[inline]
 pub fn split_mix_at(state: u64, index: u64) -> u64 {
     split_mix(state.wrapping_add(index.wrapping_mul(GAMMA)))
@@ -23,7 +23,7 @@ pub fn split_mix_at(state: u64, index: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// Of seed 1234567, from Rosetta Code, *Pseudo-random numbers/Splitmix64*.
+    /// Sequence for seed 1234567, from Rosetta Code, *Pseudo-random numbers/Splitmix64*.
     #[test]
     fn matches_the_published_sequence() {
         let expected: [u64; 5] = [

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-/// A count and what is counted: `1 person`, `2 persons`, `0 persons`. The plural is the singular with an s.
+/// Formats a count with its noun: `1 person`, `2 persons`, `0 persons`. The plural is the singular with an s.
 pub fn count<N: Display + PartialEq + From<u8>>(n: N, singular: &str) -> String {
     match n == N::from(1) {
         true => format!("{n} {singular}"),
@@ -10,7 +10,7 @@ pub fn count<N: Display + PartialEq + From<u8>>(n: N, singular: &str) -> String 
     }
 }
 
-/// [`count`] with a plural that is not the singular with an s: `2 vertices`.
+/// The same as [`count`] with an irregular plural: `2 vertices`.
 pub fn count_as<N: Display + PartialEq + From<u8>>(n: N, singular: &str, plural: &str) -> String {
     let noun = if n == N::from(1) { singular } else { plural };
     format!("{n} {noun}")

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-/// An error and all its causes in one line: `cannot read a.toml: permission denied`.
+/// Formats an error and all its causes in one line: `cannot read a.toml: permission denied`.
 pub fn error_chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

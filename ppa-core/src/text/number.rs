@@ -2,21 +2,21 @@
 
 use std::fmt;
 
-/// A number to be formatted with `{}`, `{:.2}`, `{:>9.2}` or `{:+.2}` as an f64 is, but without a sign where all digits are zeros.
+/// A number formatted like an f64 with `{}`, `{:.2}`, `{:>9.2}` or `{:+.2}`, but without a sign if all digits are zeros.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Number(f64);
 
-/// Numbers to be formatted as one [`Number`] is, with a comma and a space between two.
+/// Numbers formatted like [`Number`], separated by a comma and a space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Numbers(Vec<f64>);
 
-/// A number that never shows as a negative zero: `{:.3}` of -0.0001 gives `0.000`. Without a precision, large and small numbers
-/// have an exponent: `1e300`.
+/// Wraps a number so that it is never shown as a negative zero: `{:.3}` of -0.0001 gives `0.000`. Without a precision, large and small
+/// numbers have an exponent: `1e300`.
 pub fn number(value: impl Into<f64>) -> Number {
     Number(value.into())
 }
 
-/// A list of numbers that never show as negative zeros: `{:.1}` gives `1.0, 2.0, 0.0`.
+/// Wraps a list of numbers that are never shown as negative zeros: `{:.1}` gives `1.0, 2.0, 0.0`.
 pub fn numbers<T: Into<f64>>(values: impl IntoIterator<Item = T>) -> Numbers {
     Numbers(values.into_iter().map(Into::into).collect())
 }
@@ -88,7 +88,7 @@ mod tests {
     }
 
     proptest! {
-        /// What an f64 shows, unless that is a negative zero.
+        /// Numbers are shown as f64 shows them unless that is a negative zero.
         #[test]
         fn numbers_show_as_f64_does_but_for_zeros(value in -2.0..2.0_f64, decimals in 0..5_usize, width in 0..12_usize) {
             let shown = format!("{:>width$.decimals$}", number(value));

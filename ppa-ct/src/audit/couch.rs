@@ -1,4 +1,4 @@
-//! Whether there is a couch, and whether it is where the patient position implies.
+//! Presence of a couch, and whether its place agrees with the patient position.
 
 use std::iter;
 use std::ops::Range;
@@ -6,42 +6,42 @@ use std::ops::Range;
 use super::findings::{Finding, FindingCode, Severity};
 use super::survey::Survey;
 
-/// Denser than air and foam: shells of a couch are thin, so that their blocks are half air.
+/// Lower limit of shells, above air and foam: shells of a couch are thin, so that their blocks are half air.
 const SHELL_HU: f32 = -750.0;
-/// A shell runs through at least this share of the slices.
+/// Smallest share of the slices through which a shell runs.
 const PERSISTS: f64 = 0.9;
-/// Thickest shell, from front to back.
+/// Largest thickness of a shell, from front to back.
 const THICK_MM: f64 = 20.0;
-/// Columns without shell that do not end it: streaks, joints.
+/// Largest number of columns without shell that do not end it: streaks, joints.
 const HOLE: usize = 3;
-/// Narrowest couch. Skin folds and sheets of real limbs reach 40 mm.
+/// Smallest width of a couch. Skin folds and sheets of real limbs reach 40 mm.
 const LEAST_WIDTH_MM: f64 = 60.0;
 
 /// A thin plate, flat or curved, that runs along the whole scan.
 pub(super) struct Couch {
     pub width_mm: f64,
-    /// Whether the limb lies in front of it; else behind.
+    /// Whether it is behind the limb; otherwise it is in front.
     pub behind: bool,
-    /// Columns and places along y where it was seen, in blocks, columns rising.
+    /// Columns and positions along y where it was found, in blocks, in order of columns.
     path: Vec<(usize, f64)>,
 }
 
-/// A thin place that continues one of an earlier column.
+/// A thin section that continues one of an earlier column.
 struct Link {
     x: usize,
     y: f64,
     before: Option<usize>,
-    /// Column in which the chain of links up to here begins, and how many they are.
+    /// First column of the chain that ends here, and its number of links.
     start: usize,
     count: usize,
 }
 
-/// The widest thin plate, if it is wide enough for a couch; `thick` are the blocks of thick things.
+/// Finds the widest thin plate, if it is wide enough for a couch; `thick` marks blocks of thick objects.
 pub(super) fn find(survey: &Survey, thick: &[bool]) -> Option<Couch> {
     let [dx, dy, _] = survey.spacing_mm;
-    // A curved couch rises by less than three quarters of its way sideways.
+    // A curved couch rises by less than three quarters of its sideways distance.
     let rise = 0.75 * dx / dy + 1.0;
-    // By column, then by y.
+    // Ordered by column, then by y.
     let mut links = Vec::<Link>::new();
     let mut columns = Vec::<Range<usize>>::new();
     let mut widest = None;
@@ -85,7 +85,7 @@ pub(super) fn find(survey: &Survey, thick: &[bool]) -> Option<Couch> {
     })
 }
 
-/// Mean place along y of the blocks of thick things.
+/// Mean position along y of the blocks of thick objects.
 fn middle_y(survey: &Survey, thick: &[bool]) -> Option<f64> {
     let [nx, ny, _] = survey.size;
     let places = thick.iter().enumerate().filter(|(_, thick)| **thick);
@@ -95,7 +95,7 @@ fn middle_y(survey: &Survey, thick: &[bool]) -> Option<f64> {
     (count > 0).then(|| sum as f64 / f64::from(count))
 }
 
-/// Middles of the thin runs along y in column `x` that persist through the slices.
+/// Centres of the thin runs along y in column `x` that persist through the slices.
 fn thin_places(survey: &Survey, x: usize) -> Vec<f64> {
     let [_, ny, nz] = survey.size;
     let dense = (0..ny).map(|y| {
@@ -107,7 +107,7 @@ fn thin_places(survey: &Survey, x: usize) -> Vec<f64> {
     let mut start = 0;
     for (y, _) in dense.iter().enumerate().filter(|(_, dense)| !**dense) {
         let thickness_mm = (y - start) as f64 * survey.spacing_mm[1];
-        // A run that begins at the face may be the rest of something thick.
+        // A run that begins at the face may be the remainder of something thick.
         if 0 < start && start < y && thickness_mm <= THICK_MM {
             places.push((start + y - 1) as f64 / 2.0);
         }
@@ -117,19 +117,19 @@ fn thin_places(survey: &Survey, x: usize) -> Vec<f64> {
 }
 
 impl Couch {
-    /// Takes the couch, and what lies beyond it, out of the blocks of thick things.
+    /// Removes the couch and everything beyond it from the blocks of thick objects.
     pub fn clear(&self, survey: &Survey, thick: &mut [bool]) {
         let [nx, ny, _] = survey.size;
         for (index, thick) in thick.iter_mut().enumerate() {
             let (x, y) = (index % nx, (index / nx % ny) as f64);
-            // The nearest column where the couch was seen.
+            // The nearest column in which the couch was found.
             let after = self.path.partition_point(|(column, _)| *column < x);
             let shell = self.path[after.min(self.path.len() - 1)].1;
             *thick &= if self.behind { y < shell } else { y > shell };
         }
     }
 
-    /// What to say of it, given how the patient lay.
+    /// Returns the finding for the couch, given the position of the patient.
     pub fn finding(&self, position: Option<&str>) -> Finding {
         let (place, lying) = if self.behind {
             ("behind", "supine")

@@ -9,7 +9,7 @@ use ppa_core::text::count;
 use crate::acquisition::Acquisition;
 use crate::scan::{Warning, WarningCode};
 
-/// One thing found out about a scan.
+/// One finding about a scan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// Stable code for scripts.
@@ -52,21 +52,21 @@ pub enum FindingCode {
     LeftHanded,
     /// Voxels are large for a limb.
     CoarseVoxels,
-    /// Slices are thinner than their distance: parts were never imaged.
+    /// Slices are thinner than their distance: some tissue was never imaged.
     GapsBetweenSlices,
     /// Slices are thicker than their distance.
     OverlappingSlices,
-    /// The source went through a lossy compression.
+    /// The source was compressed with loss.
     LossyPixels,
     /// All values are shifted: a rescale intercept is missing or wrong.
     ShiftedValues,
     /// No air near −1000 HU.
     NoAir,
-    /// Air lies off −1000 HU.
+    /// The peak of air is off −1000 HU.
     AirOffScale,
     /// No soft tissue.
     NoTissue,
-    /// Soft tissue lies off its HU.
+    /// The peak of soft tissue is off its expected HU.
     TissueOffScale,
     /// No bone.
     NoBone,
@@ -80,7 +80,7 @@ pub enum FindingCode {
     Metal,
     /// A couch-like plate.
     Couch,
-    /// The couch is not where the patient's position says.
+    /// The couch is not where the stated patient position implies.
     CouchMisplaced,
     /// The field of view cuts tissue at a side.
     CutAtSide,
@@ -88,7 +88,7 @@ pub enum FindingCode {
     CutAtEnd,
     /// Attributes of the source identify somebody or something.
     Identifiers,
-    /// What a reader warned of, under the reader's own code.
+    /// A warning of a reader, under the reader's own code.
     #[serde(untagged)]
     Reader(WarningCode),
 }
@@ -105,7 +105,7 @@ impl Finding {
         }
     }
 
-    /// What a reader warned of.
+    /// Converts a warning of a reader to a finding.
     pub(super) fn of_warning(warning: &Warning) -> Self {
         let severity = match warning.code {
             WarningCode::LocalizersDropped
@@ -122,9 +122,9 @@ impl Finding {
     }
 }
 
-/// Which identifying attributes there are; their values are nowhere.
+/// Finding on the identifying attributes present, without their values.
 pub(super) fn identifiers(acquisition: &Acquisition) -> Option<Finding> {
-    /// Names written out.
+    /// Largest number of names listed.
     const SHOWN: usize = 8;
     let names = acquisition.identifiers.iter().copied().collect::<Vec<_>>();
     let mut list = names

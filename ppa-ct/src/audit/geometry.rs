@@ -5,11 +5,11 @@ use super::findings::{Finding, FindingCode, Severity};
 use crate::grid::Grid;
 use crate::scan::{Scan, WarningCode};
 
-/// Below this a lean of the slice step is rounding.
+/// Largest tilt of the slice step that is attributed to rounding.
 const TILT_DEG: f64 = 0.5;
-/// Voxels longer than this show in the images, and longer than that spoil them.
+/// Voxel lengths above which voxels show in the images and spoil them.
 const COARSE_MM: [f64; 2] = [3.0, 5.0];
-/// Slice thickness and step that differ by less are equal, as a fraction of the step.
+/// Relative difference, as a fraction of the step, below which slice thickness and step count as equal.
 const SAME_THICKNESS: f64 = 0.05;
 
 /// Volume of a voxel.
@@ -18,7 +18,7 @@ pub(super) fn voxel_cm3(grid: &Grid) -> f64 {
     linear.determinant().abs() / 1000.0
 }
 
-/// Directions that the voxel axes run closest to.
+/// Letters of the body directions closest to the voxel axes.
 pub(super) fn letters(grid: &Grid) -> String {
     let mut letters = ['?'; 3];
     for (direction, (axis, against)) in grid.lps_axes().into_iter().enumerate() {

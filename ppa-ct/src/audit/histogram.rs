@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use crate::values::Values;
 
-/// Lowest and highest HU with a bin of its own; values beyond fall into the outermost bins.
+/// Lowest and highest HU with a bin of its own; values beyond them are counted in the outermost bins.
 const LOW: i32 = -3100;
 const HIGH: i32 = 4100;
-/// Standard deviation of the smoothing that makes noise one peak, HU.
+/// Standard deviation of the smoothing that merges noise into one peak, HU.
 const SMOOTHING_HU: f64 = 10.0;
 
 /// Counts of voxels per HU, rounded to whole numbers.
@@ -18,7 +18,7 @@ pub(super) struct Histogram {
     pub max: f32,
     pub at_min: u64,
     pub at_max: u64,
-    /// Voxels less than 10.5 HU below the highest, itself left out.
+    /// Voxels less than 10.5 HU below the highest value, excluding that value.
     pub near_max: u64,
 }
 
@@ -26,7 +26,7 @@ impl Histogram {
     pub fn of(hu: Values) -> Self {
         let (min, max) = hu.range();
         let bins = (HIGH - LOW + 1) as usize;
-        // Whole numbers: the sum is the same in any order.
+        // Integers: the sum is the same in any order.
         let parts = hu.par_parts(1 << 20).map(|values| {
             let mut counts = vec![0_u64; bins + 3];
             let mut count = |bin: usize, value: f32| {
@@ -72,7 +72,7 @@ impl Histogram {
         self.counts[bin(low)..=bin(high)].iter().sum()
     }
 
-    /// The HU below which `share` of all voxels lie.
+    /// The HU below which a `share` of all voxels is found.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.total as f64;
         let mut sum = 0;
@@ -85,8 +85,8 @@ impl Histogram {
         f64::from(HIGH)
     }
 
-    /// The HU of the highest place of the smoothed histogram from `low` to `high`, if at least `least` of
-    /// all voxels lie within 50 HU of it.
+    /// The HU of the maximum of the smoothed histogram from `low` to `high`, if at least a share `least` of
+    /// all voxels is within 50 HU of it.
     pub fn peak(&self, low: f32, high: f32, least: f64) -> Option<f64> {
         let reach = (3.0 * SMOOTHING_HU) as usize;
         let smoothed = |at: usize| {

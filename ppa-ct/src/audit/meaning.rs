@@ -4,7 +4,7 @@ use super::findings::FindingCode;
 use crate::scan::WarningCode;
 
 impl FindingCode {
-    /// For depth images, then for radiographs.
+    /// Consequences for depth images, then for radiographs.
     pub(super) fn meaning(self) -> (&'static str, &'static str) {
         use FindingCode as F;
         match self {

@@ -1,14 +1,14 @@
-//! A volume at a glance: means of about 2 mm in the order of the body's axes.
+//! A coarse copy of a volume: means over blocks of about 2 mm, ordered along the body's axes.
 
 use rayon::prelude::*;
 
 use crate::lps_view::LpsView;
 use crate::volume::Volume;
 
-/// Side that blocks of voxels come close to, mm.
+/// Approximate side of a block, mm.
 const BLOCK_MM: f64 = 2.0;
 
-/// Means of blocks of voxels; x runs to the left, y posterior, z superior, x fastest.
+/// Means over blocks of voxels; x runs to the left, y posterior, z superior, x fastest.
 pub(super) struct Survey {
     pub size: [usize; 3],
     pub spacing_mm: [f64; 3],
@@ -29,7 +29,7 @@ impl Survey {
         rows.for_each(|(row, means)| {
             let (y, z) = (row % size[1], row / size[1]);
             for (x, mean) in means.iter_mut().enumerate() {
-                // The last block of an axis may hold fewer voxels: the faces must not be lost.
+                // The last block of an axis may hold fewer voxels, so that the faces are kept.
                 let from = [x * block[0], y * block[1], z * block[2]];
                 let to = [0, 1, 2].map(|axis| (from[axis] + block[axis]).min(fine[axis]));
                 let (mut sum, mut count) = (0.0, 0);

@@ -4,14 +4,14 @@ use super::findings::{Finding, FindingCode, Severity};
 use super::survey::Survey;
 use super::{CutFaces, Measures};
 
-/// Halfway between air and fat is −550; a margin keeps foam and sheets out.
+/// Lower limit of tissue. Halfway between air and fat is −550; the margin excludes foam and sheets.
 const TISSUE_HU: f32 = -300.0;
-/// What is thinner than this from front to back is couch or sheet, not limb.
+/// Smallest thickness of a limb from front to back; anything thinner is couch or sheet.
 const THICK_MM: f64 = 10.0;
-/// Smaller cuts are sheets, noise and partial volume, cm².
+/// Smallest area reported as a cut; smaller ones are sheets, noise and partial volume, cm².
 const LEAST_CUT_CM2: f64 = 4.0;
 
-/// Which blocks are tissue of something thick.
+/// Marks the blocks that are tissue of a thick object.
 pub(super) fn thick(survey: &Survey) -> Vec<bool> {
     let [nx, ny, nz] = survey.size;
     let mut thick = vec![false; survey.hu.len()];
@@ -59,13 +59,13 @@ pub(super) fn cut_faces(survey: &Survey, thick: &[bool]) -> CutFaces {
     }
 }
 
-/// Lossy compression and rounding change padding by no more than this.
+/// Largest change of padding by lossy compression and rounding.
 const PADDING_HU: f32 = 5.0;
 
 /// Area of tissue at the edge of a round field of view; 0 when the field is not round.
 ///
-/// A scanner reconstructs a circle: when every voxel outside the circle inscribed in the slices
-/// has the same value, that value is padding, and what touches the circle is cut.
+/// A scanner reconstructs a circle: if every voxel outside the circle inscribed in the slices
+/// has the same value, that value is padding, and tissue that touches the circle is cut.
 pub(super) fn cut_by_circle(survey: &Survey, thick: &[bool]) -> f64 {
     let [nx, ny, nz] = survey.size;
     let [dx, dy, dz] = survey.spacing_mm;
@@ -95,7 +95,7 @@ pub(super) fn cut_by_circle(survey: &Survey, thick: &[bool]) -> f64 {
             }
         }
     }
-    // Blocks cover the ring's area, of which its width is a divisor.
+    // The blocks cover the area of the ring; divided by its width, this gives the length.
     ring as f64 * dx * dy / (2.0 * block) * dz / 100.0
 }
 

@@ -1,4 +1,4 @@
-//! Whether the values are Hounsfield units, unclipped, and those of a limb.
+//! Checks that the values are Hounsfield units, unclipped, and those of a limb.
 
 use ppa_core::text::{count, number};
 
@@ -7,22 +7,22 @@ use super::findings::{Finding, FindingCode, Severity};
 use super::histogram::Histogram;
 use crate::acquisition::Acquisition;
 
-/// Above this lies bone.
+/// Lower limit of bone.
 pub(super) const BONE_HU: f32 = 300.0;
-/// Above this lies metal: cortical bone stays below 2200 HU, enamel, about 3000 HU, does not occur in limbs.
+/// Lower limit of metal: cortical bone stays below 2200 HU; enamel, about 3000 HU, does not occur in limbs.
 pub(super) const METAL_HU: f32 = 2500.0;
-/// Less than this is noise, cm³.
+/// Smallest volume reported as metal rather than noise, cm³.
 const LEAST_METAL_CM3: f64 = 0.05;
-/// Farthest that the peak of air may lie from −1000 HU in a calibrated scanner.
+/// Largest distance of the air peak from −1000 HU in a calibrated scanner.
 const AIR_SLACK_HU: f64 = 60.0;
-/// Smallest share of the voxels that makes a peak.
+/// Smallest share of the voxels that counts as a peak.
 const LEAST_SHARE: f64 = 0.005;
 
-/// Where air and soft tissue are.
+/// Peaks of air and soft tissue.
 pub(super) struct Peaks {
     pub air_hu: Option<f64>,
     pub tissue_hu: Option<f64>,
-    /// Peaks of air and tissue in a histogram that looks like one in HU, but is shifted as a whole.
+    /// Peaks of air and tissue in a histogram that looks like one in HU, but is shifted.
     shifted: Option<[f64; 2]>,
 }
 
@@ -40,7 +40,7 @@ pub(super) fn peaks(histogram: &Histogram) -> Peaks {
     }
 }
 
-/// Two peaks as far apart as air and tissue, the lower one the lowest of all.
+/// Finds two peaks as far apart as air and tissue, the lower one at the bottom of the range.
 fn shifted(histogram: &Histogram) -> Option<[f64; 2]> {
     let lowest = histogram.quantile(0.02) as f32;
     let air = histogram.peak(lowest - 50.0, lowest + 150.0, 0.05)?;
@@ -49,7 +49,7 @@ fn shifted(histogram: &Histogram) -> Option<[f64; 2]> {
     Some([air, tissue])
 }
 
-/// What else the values show.
+/// Checks the values for bone, clipping, padding and metal.
 pub(super) fn check(
     histogram: &Histogram,
     peaks: &Peaks,
@@ -91,7 +91,7 @@ pub(super) fn check(
     found
 }
 
-/// Whether air and tissue are where they belong.
+/// Checks whether air and tissue have their expected values.
 pub(super) fn scale(peaks: &Peaks) -> Vec<Finding> {
     use FindingCode::{AirOffScale, NoAir, NoTissue, ShiftedValues, TissueOffScale};
     if let Some([air, tissue]) = peaks.shifted {
@@ -135,7 +135,7 @@ pub(super) fn scale(peaks: &Peaks) -> Vec<Finding> {
     found
 }
 
-/// More voxels than chance at the ends of the range.
+/// Finds more voxels at the ends of the range than expected by chance.
 fn clipping(histogram: &Histogram, acquisition: &Acquisition) -> Vec<Finding> {
     let mut found = Vec::new();
     let (min, max) = (histogram.min, histogram.max);
@@ -144,7 +144,7 @@ fn clipping(histogram: &Histogram, acquisition: &Acquisition) -> Vec<Finding> {
         .is_some_and(|[_, high]| f64::from(max) > high - 0.5);
     let tail = histogram.near_max as f64 / 10.0;
     let piled_up = histogram.at_max >= 20 && histogram.at_max as f64 > 5.0 * tail;
-    // Below bone nothing is lost that a radiograph would show.
+    // Clipping below bone loses nothing that a radiograph would show.
     if max > BONE_HU && (at_limit || piled_up) {
         found.push(Finding::new(
             FindingCode::ClippedAbove,

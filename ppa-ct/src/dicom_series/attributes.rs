@@ -1,4 +1,4 @@
-//! The attributes of one frame, wherever its object keeps them.
+//! The attributes of one frame, wherever its object stores them.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::element::{DataSet, Fault};
 use super::file::{damaged, text};
 use crate::error::ReadError;
 
-/// The data set of a file, and for multi-frame objects the groups that hold for one frame.
+/// The data set of a file and, for multi-frame objects, the groups that apply to one frame.
 pub(super) struct Attributes<'a> {
     pub path: &'a Path,
     pub data_set: &'a DataSet<'a>,
@@ -19,7 +19,7 @@ pub(super) struct Attributes<'a> {
     pub mappings: &'a [DataSet<'a>],
 }
 
-/// Functional groups of one frame, or those that all frames share (PS3.3, section C.7.6.16).
+/// Functional groups of one frame, or those shared by all frames (PS3.3, section C.7.6.16).
 ///
 /// Their sequences are parsed once, not for each frame and attribute.
 pub(super) struct Groups<'a>(Vec<(Tag, Vec<DataSet<'a>>)>);
@@ -44,7 +44,7 @@ impl<'a> Groups<'a> {
 }
 
 impl<'a> Attributes<'a> {
-    /// Those of an object without functional groups.
+    /// The attributes of an object without functional groups.
     pub fn of(path: &'a Path, data_set: &'a DataSet<'a>) -> Self {
         Self {
             path,
@@ -62,23 +62,23 @@ impl<'a> Attributes<'a> {
         grouped.or_else(|| self.data_set.get(tag))
     }
 
-    /// An attribute as text without padding; `None` when it is absent or empty.
+    /// Returns an attribute as text without padding; `None` when it is absent or empty.
     pub fn text(&self, tag: Tag) -> Option<String> {
         self.value(tag).map(text).filter(|text| !text.is_empty())
     }
 
-    /// A binary number of 16 bits, which all frames share.
+    /// Returns a 16-bit number that all frames share.
     pub fn word(&self, tag: Tag) -> Option<u16> {
         let bytes = self.data_set.get(tag)?.first_chunk::<2>()?;
         Some(self.data_set.encoding().u16(*bytes))
     }
 
-    /// A binary number of 16 bits that must be there.
+    /// Returns a required 16-bit number.
     pub fn needed_word(&self, tag: Tag, name: &'static str) -> Result<u16, ReadError> {
         self.word(tag).ok_or_else(|| self.missing(name))
     }
 
-    /// Numbers written as text that must be there.
+    /// Returns required numbers written as text.
     pub fn numbers<const N: usize>(
         &self,
         tag: Tag,
@@ -91,7 +91,7 @@ impl<'a> Attributes<'a> {
             .and_then(|values| <[f64; N]>::try_from(values).ok())
             .filter(|values| values.iter().all(|v| v.is_finite()))
             .ok_or_else(|| {
-                // Words instead of numbers may be anything, a name too.
+                // Text that is not numeric may be anything, even a name.
                 let numeric = |c: char| c.is_ascii_digit() || "+-.eE\\ ".contains(c);
                 let found = match text.chars().all(numeric) {
                     true => text,
@@ -105,7 +105,7 @@ impl<'a> Attributes<'a> {
             })
     }
 
-    /// A number written as text; `None` when it is absent or empty.
+    /// Returns a number written as text; `None` when it is absent or empty.
     pub fn optional(&self, tag: Tag, name: &'static str) -> Result<Option<f64>, ReadError> {
         match self.text(tag) {
             None => Ok(None),
@@ -113,7 +113,7 @@ impl<'a> Attributes<'a> {
         }
     }
 
-    /// The code of the unit that the frame's real-world values are in.
+    /// Returns the code of the unit of the frame's real-world values.
     pub fn real_world_unit(&self) -> Result<Option<String>, ReadError> {
         let fault = |f| damaged(self.path, f);
         let sequence = tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE;
@@ -145,7 +145,7 @@ impl<'a> Attributes<'a> {
     }
 }
 
-/// The functional group that holds an attribute in multi-frame objects.
+/// Returns the functional group that holds an attribute in multi-frame objects.
 fn group_of(tag: Tag) -> Option<Tag> {
     match tag {
         tags::IMAGE_POSITION_PATIENT => Some(tags::PLANE_POSITION_SEQUENCE),

@@ -1,7 +1,7 @@
 //! Decoding of compressed frames into little-endian samples.
 //!
-//! Decoders: RLE and JPEG-LS are ours (no maintained pure-Rust crate decodes the latter), JPEG is libjpeg-turbo-rs,
-//! JPEG 2000 hayro-jpeg2000. All are Rust; sizes are compared with the header before any of them reserves memory.
+//! RLE and JPEG-LS are decoded here (no maintained pure-Rust crate decodes the latter), JPEG by libjpeg-turbo-rs and
+//! JPEG 2000 by hayro-jpeg2000. All are Rust; sizes are compared with the header before any of them reserves memory.
 
 mod jpeg;
 mod jpeg_2000;
@@ -33,7 +33,7 @@ pub(super) enum CodecError {
 }
 
 impl Codec {
-    /// Unpacks one frame into `image.native_bytes()` bytes.
+    /// Decodes one frame into `image.native_bytes()` bytes.
     pub fn unpack(self, packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
         match self {
             Self::Rle => {
@@ -48,10 +48,10 @@ impl Codec {
         }
     }
 
-    /// Most bytes that one byte of a valid stream can decode to: constant frames compress best.
+    /// Largest number of bytes that one byte of a valid stream can decode to: constant frames compress best.
     ///
-    /// RLE makes 128 bytes of 2; a JPEG pixel takes at least a bit, a block of 8 x 8 pixels two. `None` where nothing
-    /// bounds it: JPEG-LS puts whole equal lines into a bit each, a JPEG 2000 frame may be empty.
+    /// RLE expands 2 bytes to 128; a JPEG pixel takes at least a bit, a block of 8 x 8 pixels two. `None` if there is no
+    /// bound: JPEG-LS codes an entire repeated line in one bit, and a JPEG 2000 frame may be empty.
     pub fn expands_at_most(self) -> Option<u64> {
         match self {
             Self::Rle => Some(64),
@@ -97,7 +97,7 @@ fn expect_grey(components: usize) -> Result<(), CodecError> {
     })
 }
 
-/// The next marker of a stream.
+/// Reads the next marker of a stream.
 fn marker(rest: &mut &[u8]) -> Option<u8> {
     let [0xff, marker, tail @ ..] = *rest else {
         return None;
@@ -106,7 +106,7 @@ fn marker(rest: &mut &[u8]) -> Option<u8> {
     Some(*marker)
 }
 
-/// The body of a segment, behind its length.
+/// Reads the body of a segment, after its length.
 fn segment<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let (length, tail) = rest.split_first_chunk::<2>()?;
     let length = usize::from(u16::from_be_bytes(*length)).checked_sub(2)?;
@@ -115,7 +115,7 @@ fn segment<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     Some(body)
 }
 
-/// Decoded samples in the containers of the header.
+/// Stores decoded samples in the containers of the header.
 fn contain(
     samples: impl ExactSizeIterator<Item = u32>,
     image: &Image,
@@ -144,7 +144,7 @@ fn contain(
     Ok(bytes)
 }
 
-/// Refuses an image for which a decoder, that would end the program where memory does, finds too little on any thread.
+/// Refuses an image if memory does not suffice to decode it on every thread: the decoder would abort the program.
 fn expect_memory(image: &Image, bytes_per_pixel: usize) -> Result<(), CodecError> {
     let bytes = image.pixels().saturating_mul(bytes_per_pixel);
     with_room::<u8>(bytes.saturating_mul(rayon::current_num_threads()))?;

@@ -1,6 +1,6 @@
 //! Modality and unit of a header as terms of closed lists.
 //!
-//! These attributes are text, and text may be anything: only terms that the standard defines are repeated.
+//! These attributes are free text in a file: only terms defined by the standard are repeated in messages.
 
 /// Modality (PS3.3, section C.7.3.1.1.1), retired terms last.
 const MODALITIES: &str = "\
@@ -33,18 +33,18 @@ const COLOURS: [&str; 12] = [
     "YBR_RCT",
 ];
 
-/// The photometric interpretation of a colour image, unless the standard does not know it.
+/// The photometric interpretation of a colour image, if the standard defines it.
 pub(super) fn photometric(text: &str) -> &'static str {
     let known = COLOURS.into_iter().find(|term| *term == text);
     known.unwrap_or("(no DICOM term)")
 }
 
-/// The modality, unless the standard does not know it.
+/// The modality, if the standard defines it.
 pub(super) fn modality(text: &str) -> &'static str {
     listed(MODALITIES, text).unwrap_or("(no DICOM term)")
 }
 
-/// The rescale type or unit, unless it is none of the lists'.
+/// The rescale type or unit, if it is in one of the lists.
 pub(super) fn unit(text: &str) -> &'static str {
     listed(RESCALE_TYPES, text)
         .or_else(|| listed(UNITS, text))

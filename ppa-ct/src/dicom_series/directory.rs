@@ -1,4 +1,4 @@
-//! A DICOMDIR and the files of the medium that it names (DICOM PS3.3, annex F).
+//! A DICOMDIR and the files that it lists (DICOM PS3.3, annex F).
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -9,19 +9,19 @@ use super::element::DataSet;
 use super::file::{damaged, text};
 use crate::error::ReadError;
 
-/// The files that a directory names.
+/// The files listed in a directory.
 #[derive(Debug, Default)]
 pub(super) struct Listed {
-    /// Those that are there.
+    /// Files that exist.
     pub files: BTreeSet<PathBuf>,
-    /// How many are not.
+    /// Number of missing files.
     pub missing: usize,
 }
 
 /// Reads the records of the directory at `path`.
 ///
 /// # Errors
-/// [`ReadError::BadTag`] for a file that does not lie below the directory, be it by its name or by a link.
+/// [`ReadError::BadTag`] for a file that is outside the directory's folder, by its name or by a link.
 pub(super) fn listed(path: &Path, data_set: &DataSet) -> Result<Listed, ReadError> {
     let io = |path: &Path, source| ReadError::Io {
         path: path.to_owned(),
@@ -46,7 +46,7 @@ pub(super) fn listed(path: &Path, data_set: &DataSet) -> Result<Listed, ReadErro
         if !parts.iter().copied().all(is_name) {
             return Err(outside(path));
         }
-        // Media are often mounted with names in small letters.
+        // Media are often mounted with names in lower case.
         let written = parts.iter().collect::<PathBuf>();
         let small = parts.iter().map(|part| part.to_ascii_lowercase());
         let places = [written, small.collect()].map(|name| folder.join(name));
@@ -64,7 +64,7 @@ pub(super) fn listed(path: &Path, data_set: &DataSet) -> Result<Listed, ReadErro
     Ok(listed)
 }
 
-/// Whether a part of a file's identifier is the name of a file or folder, and nothing else.
+/// Whether a component of a file identifier is a plain file or folder name.
 fn is_name(part: &str) -> bool {
     let path = Path::new(part);
     let mut parts = path.components();

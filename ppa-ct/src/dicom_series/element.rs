@@ -1,4 +1,4 @@
-//! Where the elements of a DICOM data set lie in its bytes (PS3.5, section 7).
+//! Positions of the elements of a DICOM data set in its bytes (PS3.5, section 7).
 //!
 //! Lengths are followed only as far as the bytes reach and nothing is copied. A damaged length is therefore an error and reserves no memory
 //! (dicom-object reserves whatever length a file claims, up to 4 GiB), and pixels are read in place.
@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use dicom_core::{Tag, VR};
 
-/// How elements are written.
+/// Encoding of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
     ImplicitLittle,
@@ -17,7 +17,7 @@ pub(super) enum Encoding {
     ExplicitBig,
 }
 
-/// Why bytes are no data set.
+/// Why bytes are not a valid data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Fault {
     /// An element continues beyond the last byte.
@@ -26,12 +26,12 @@ pub(super) enum Fault {
     /// Not an element, or sequences nested too deeply.
     #[error("no valid element begins at byte {0} of the data set")]
     Damaged(usize),
-    /// A deflated header beyond all measure.
+    /// A deflated header that is unreasonably long.
     #[error("no pixel data in the first {0} bytes after inflating")]
     Endless(u64),
 }
 
-/// Sequences in sequences; real ones go five deep.
+/// Deepest nesting of sequences accepted; real files reach five.
 pub(super) const DEEPEST: usize = 16;
 const ITEM: Tag = Tag(0xfffe, 0xe000);
 const ITEM_END: Tag = Tag(0xfffe, 0xe00d);
@@ -57,15 +57,15 @@ impl Encoding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ElementHeader {
     pub tag: Tag,
-    /// Value representation; `None` where it is not written.
+    /// Value representation; `None` if it is not stored.
     pub vr: Option<[u8; 2]>,
     /// First byte of the value.
     pub value_at: usize,
-    /// Bytes of the value; `None` for a sequence that is ended by a delimiter.
+    /// Length of the value in bytes; `None` for a sequence that is ended by a delimiter.
     pub length: Option<usize>,
 }
 
-/// An element that lies whole in its bytes.
+/// An element that is completely contained in the bytes.
 #[derive(Debug)]
 pub(super) struct Element {
     pub tag: Tag,
@@ -74,7 +74,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Value representation, where it is written.
+    /// Value representation, if it is stored.
     pub fn vr(&self) -> Option<VR> {
         self.vr.and_then(VR::from_binary)
     }
@@ -90,7 +90,7 @@ pub(super) struct DataSet<'a> {
 
 impl<'a> DataSet<'a> {
     /// Finds the elements from byte `at` on, up to the first for which `stop` is true, or to the end;
-    /// also returns where that is.
+    /// also returns the end position.
     pub fn parse(
         bytes: &'a [u8],
         mut at: usize,
@@ -119,12 +119,12 @@ impl<'a> DataSet<'a> {
         Ok((found, at))
     }
 
-    /// The value of an element; `None` when it is absent.
+    /// Returns the value of an element; `None` when it is absent.
     pub fn get(&self, tag: Tag) -> Option<&'a [u8]> {
         self.find(tag).map(|element| self.value(element))
     }
 
-    /// The value of one of its elements.
+    /// Returns the value of one of the data set's elements.
     pub fn value(&self, element: &Element) -> &'a [u8] {
         &self.bytes[element.value.clone()]
     }
@@ -133,23 +133,23 @@ impl<'a> DataSet<'a> {
         self.elements.iter().find(|element| element.tag == tag)
     }
 
-    /// All elements; a damaged file may hold a tag more than once.
+    /// All elements; a damaged file may contain a tag more than once.
     pub fn elements(&self) -> &[Element] {
         &self.elements
     }
 
-    /// How the numbers in it are written.
+    /// Encoding of the numbers in it.
     pub fn encoding(&self) -> Encoding {
         self.encoding
     }
 
-    /// The items of a sequence; none when it is absent.
+    /// Returns the items of a sequence; empty when it is absent.
     pub fn items(&self, sequence: Tag) -> Result<Vec<DataSet<'a>>, Fault> {
         let found = self.find(sequence);
         found.map_or(Ok(Vec::new()), |element| self.items_of(element))
     }
 
-    /// The items of one of its elements.
+    /// Returns the items of one of the data set's elements.
     pub fn items_of(&self, element: &Element) -> Result<Vec<DataSet<'a>>, Fault> {
         let encoding = inside(element.vr, self.encoding);
         let bytes = &self.bytes[..element.value.end];
@@ -227,7 +227,7 @@ fn inside(vr: Option<[u8; 2]>, encoding: Encoding) -> Encoding {
     }
 }
 
-/// First byte behind an element or item, its delimiter included.
+/// First byte after an element or item, including its delimiter.
 fn end_of(
     bytes: &[u8],
     start: &ElementHeader,

@@ -13,7 +13,7 @@ use super::element::{Encoding, Fault};
 use crate::error::ReadError;
 pub(super) use open::open;
 
-/// A DICOM file whose header was found whole.
+/// A DICOM file with a complete header.
 #[derive(Debug)]
 pub(super) struct DicomFile {
     pub path: PathBuf,
@@ -23,27 +23,27 @@ pub(super) struct DicomFile {
     /// SOP class of the meta group, empty when it is missing.
     pub sop_class: String,
     pixels: Option<PixelData>,
-    /// Where the data set begins in the file, if it is deflated from there on.
+    /// Start of the data set in the file, if it is deflated from there on.
     deflated_at: Option<u64>,
-    /// All pixels of a multi-frame file that cannot be read frame by frame, once they are needed.
+    /// All pixels of a multi-frame file that cannot be read frame by frame, loaded when first needed.
     held: OnceLock<Vec<u8>>,
 }
 
-/// Where the value of Pixel Data lies.
+/// Location of the value of Pixel Data.
 #[derive(Debug, Clone, Copy)]
 struct PixelData {
-    /// In the file, or in the inflated data set.
+    /// Offset in the file, or in the inflated data set.
     at: u64,
     /// `None` for fragments.
     length: Option<u64>,
-    /// Bytes of the file that follow `at`.
+    /// Bytes of the file from `at` on.
     rest: u64,
     /// Bytes per number, which big-endian files swap.
     word: usize,
 }
 
 impl DicomFile {
-    /// Whether pixels are stored as they are, not as compressed fragments.
+    /// Whether pixels are stored uncompressed, not as compressed fragments.
     pub fn is_native(&self) -> bool {
         self.pixels.is_none_or(|pixels| pixels.length.is_some())
     }
@@ -61,7 +61,7 @@ impl DicomFile {
         })
     }
 
-    /// Keeps the pixels at hand if it takes all of them to read one frame of several.
+    /// Loads the pixels into memory if reading one frame of several requires all of them.
     pub fn hold(&self) -> Result<(), ReadError> {
         let pixels = self.pixel_data()?;
         let mut bytes = Vec::new();
@@ -76,7 +76,7 @@ impl DicomFile {
         Ok(())
     }
 
-    /// All fragments, from the table of offsets on.
+    /// All fragments, starting with the offset table.
     pub fn fragments(&self) -> Result<Cow<'_, [u8]>, ReadError> {
         if let Some(held) = self.held.get() {
             return Ok(Cow::Borrowed(held));
@@ -87,7 +87,7 @@ impl DicomFile {
         Ok(Cow::Owned(bytes))
     }
 
-    /// Reads `length` native bytes from byte `from` of the pixels on, as little-endian numbers.
+    /// Reads `length` native bytes from byte `from` of the pixels, as little-endian numbers.
     pub fn native(&self, from: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), ReadError> {
         let pixels = self.pixel_data()?;
         if let Some(held) = self.held.get() {
@@ -112,11 +112,11 @@ impl DicomFile {
         Ok(())
     }
 
-    /// Reads `length` bytes from byte `at` of the file on, or of what it inflates to.
+    /// Reads `length` bytes from byte `at` of the file, or of its inflated contents.
     fn read(&self, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), ReadError> {
         let short = || damaged(&self.path, Fault::Short);
         if self.deflated_at.is_some() {
-            // Memory grows with what is there: how much that is nobody knows before.
+            // Memory grows with the data read, since their length is not known before.
             let mut stream = self.inflated()?;
             bytes.clear();
             let skipped = std::io::copy(&mut (&mut stream).take(at), &mut std::io::sink());
@@ -130,7 +130,7 @@ impl DicomFile {
         }
         let mut file = ppa_core::regular_file::open(&self.path).map_err(|e| self.io(e))?;
         file.seek(SeekFrom::Start(at)).map_err(|e| self.io(e))?;
-        // The length was there when the header was read.
+        // The length was checked when the header was read.
         bytes.resize(length as usize, 0);
         file.read_exact(bytes).map_err(|error| match error.kind() {
             ErrorKind::UnexpectedEof => short(),
@@ -161,7 +161,7 @@ fn undeflatable(path: &Path, error: std::io::Error) -> ReadError {
     }
 }
 
-/// Our error for a damaged file.
+/// Converts a fault to the error for a damaged file.
 pub(super) fn damaged(path: &Path, fault: Fault) -> ReadError {
     ReadError::Dicom {
         path: path.to_owned(),

@@ -11,8 +11,8 @@ const END: Tag = Tag(0xfffe, 0xe0dd);
 
 /// The compressed bytes of one frame of `frames`.
 ///
-/// `bytes` start behind the length of Pixel Data; the first item is the table of offsets. `None` for the frame where
-/// fragments cannot be distinguished: several for a frame, and no table.
+/// `bytes` start after the length of Pixel Data; the first item is the offset table. Returns `None` for the frame if
+/// fragments cannot be assigned: several per frame, and no table.
 pub(super) fn of_frame(
     bytes: &[u8],
     index: usize,
@@ -37,7 +37,7 @@ pub(super) fn of_frame(
     if offsets.len() != frames {
         return Ok(None);
     }
-    // Offsets count from the first fragment's item on.
+    // Offsets are relative to the first fragment's item.
     let first = fragments.first().map_or(0, |(at, _)| *at);
     let from = |index: usize| first + u32::from_le_bytes(offsets[index]) as usize;
     let end = if index + 1 < frames {
@@ -52,7 +52,7 @@ pub(super) fn of_frame(
     Ok((!part.is_empty()).then(|| Cow::Owned(join(&part))))
 }
 
-/// All items with the places where they start.
+/// All items with their start positions.
 fn items(bytes: &[u8]) -> Result<Vec<(usize, &[u8])>, Fault> {
     let (mut items, mut at) = (Vec::new(), 0);
     loop {
@@ -108,7 +108,7 @@ mod tests {
         assert_eq!(of(&one, 0, 1).unwrap(), b"abcdef");
         assert_eq!(of(&one, 1, 3).unwrap(), b"cd");
         assert_eq!(of(&one, 0, 2), None);
-        // The second frame starts at the second fragment: 8 + 2 bytes behind the first.
+        // The second frame starts at the second fragment: 8 + 2 bytes after the first.
         let two = encapsulated(&[0, 10], &[b"ab", b"cd", b"ef"]);
         assert_eq!(of(&two, 0, 2).unwrap(), b"ab");
         assert_eq!(of(&two, 1, 2).unwrap(), b"cdef");

@@ -7,7 +7,7 @@ use super::attributes::Attributes;
 use super::defined_terms;
 use crate::error::ReadError;
 
-/// Largest cosine between row and column directions that are at right angles, in files read and written: some
+/// Largest cosine between row and column directions accepted as a right angle in files read and written: some
 /// writers round direction cosines to three digits.
 pub(crate) const RIGHT_ANGLE: f64 = 5e-3;
 
@@ -22,11 +22,11 @@ pub(super) struct Frame {
     pub down_column: Vector3<f64>,
     /// Distance between neighbouring columns and between neighbouring rows, mm.
     pub spacing_mm: [f64; 2],
-    /// Slice Thickness; only used where there is no second slice to measure the step with.
+    /// Slice Thickness; only used if there is no second slice to measure the step with.
     pub thickness_mm: Option<f64>,
     /// Slope and intercept from stored values to HU.
     pub rescale: Option<[f64; 2]>,
-    /// What the values are, where the header says that they are no HU.
+    /// Unit of the values, if the header says that they are not HU.
     pub foreign_unit: Option<&'static str>,
 }
 
@@ -46,7 +46,7 @@ impl Frame {
                 "two perpendicular unit vectors",
             ));
         }
-        // Pixel Spacing gives the distance between rows first (PS3.3, section 10.7.1.3).
+        // Pixel Spacing lists the distance between rows first (PS3.3, section 10.7.1.3).
         let [between_rows, between_columns] =
             attributes.numbers(tags::PIXEL_SPACING, "PixelSpacing")?;
         if !(between_rows > 0.0 && between_columns > 0.0) {
@@ -93,7 +93,7 @@ fn foreign_unit(attributes: &Attributes) -> Result<Option<&'static str>, ReadErr
     Ok(foreign.next().map(|text| defined_terms::unit(&text)))
 }
 
-/// Whether a text stands for Hounsfield units; writers differ in case and blanks, and some write the words.
+/// Whether a text means Hounsfield units; writers differ in case and blanks, and some spell the words out.
 fn is_hounsfield(text: &str) -> bool {
     let letters = text.chars().filter(char::is_ascii_alphanumeric);
     let letters = letters.map(|c| c.to_ascii_uppercase()).collect::<String>();

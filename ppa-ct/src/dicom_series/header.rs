@@ -15,13 +15,13 @@ use super::stored::StoredFormat;
 use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 
-/// What a DICOM file turned out to be.
+/// Contents of a DICOM file.
 pub(super) enum Found {
-    /// The slices of a CT, or of another modality that is to be read as one.
+    /// The slices of a CT, or of another modality that is to be read as CT.
     Slices(Series, Vec<Slice>),
-    /// An image that cannot be one of its series, and why.
+    /// An image that cannot be part of its series, and why.
     Refused(Series, ReadError),
-    /// An image of another modality; its geometry is not looked at.
+    /// An image of another modality; its geometry is not checked.
     OtherModality(Series),
     /// A scout view.
     Localizer,
@@ -31,7 +31,7 @@ pub(super) enum Found {
     NotAnImage,
 }
 
-/// Which series an image belongs to. The UID only groups and chooses files and goes no further.
+/// The series of an image. The UID is used only to group and choose files, and is not kept.
 pub(super) struct Series {
     pub uid: String,
     pub number: Option<i32>,
@@ -44,15 +44,15 @@ pub(super) struct Series {
 #[derive(Debug)]
 pub(super) struct Slice {
     pub file: Arc<DicomFile>,
-    /// Which frame of the file it is.
+    /// Index of the frame in the file.
     pub index: usize,
     pub image: Image,
     pub frame: Frame,
-    /// What the file says about the acquisition.
+    /// The file's statements about the acquisition.
     pub stated: Arc<Acquisition>,
 }
 
-/// What all frames of a file have in common.
+/// Properties common to all frames of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Image {
     pub columns: usize,
@@ -73,13 +73,13 @@ impl Image {
         self.columns * self.rows
     }
 
-    /// Bytes of one frame that is not compressed.
+    /// Size of an uncompressed frame in bytes.
     pub fn native_bytes(&self) -> usize {
         self.pixels() * self.stored.bytes()
     }
 }
 
-/// Reads the header of `path`, up to the pixels; `force` takes any modality for CT.
+/// Reads the header of `path`, up to the pixels; `force` treats any modality as CT.
 pub(super) fn scan(path: &Path, force: bool) -> Result<Found, ReadError> {
     let opened = open(path)?;
     let data_set = opened.data_set()?;
@@ -94,7 +94,7 @@ pub(super) fn scan(path: &Path, force: bool) -> Result<Found, ReadError> {
     let enhanced = opened.file.sop_class == uids::ENHANCED_CT_IMAGE_STORAGE;
     let described =
         image(&top).and_then(|image| Ok((image, frames(&top, image.frames, enhanced)?)));
-    // Whether that matters is known when a series is chosen.
+    // Whether that matters is decided when a series is chosen.
     let (image, frames) = match described {
         Ok(described) => described,
         Err(error) => return Ok(Found::Refused(series, error)),
@@ -182,7 +182,7 @@ fn image(top: &Attributes) -> Result<Image, ReadError> {
     })
 }
 
-/// The frames in the order of the file, each with the groups that hold for it.
+/// The frames in the order of the file, each with the groups that apply to it.
 fn frames(top: &Attributes, count: usize, enhanced: bool) -> Result<Vec<Frame>, ReadError> {
     let fault = |fault| damaged(top.path, fault);
     let items = |sequence| top.data_set.items(sequence).map_err(fault);

@@ -7,10 +7,10 @@ use super::header::Slice;
 use super::{fragments, syntax};
 use crate::error::ReadError;
 
-/// Most bytes that one byte makes on average over a series of JPEG-LS or JPEG 2000.
+/// Largest average expansion of a byte over a series of JPEG-LS or JPEG 2000.
 const EXPANDS_AT_MOST: u64 = 1 << 14;
-/// What any such series may come to, however well it packs: a blank slice of 4096 x 4096 pixels of 32 bits, or eight
-/// of 2048 x 2048 of 16.
+/// Decoded size that any such series may have, however well it compresses: a blank slice of 4096 x 4096 pixels of 32
+/// bits, or eight of 2048 x 2048 of 16.
 const ALWAYS_BYTES: u64 = 1 << 26;
 
 /// Refuses files that claim more pixels than their bytes can hold, before memory is reserved for them.

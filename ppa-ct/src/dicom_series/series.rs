@@ -7,22 +7,22 @@ use super::header::{Found, Series, Slice};
 use crate::error::ReadError;
 use crate::scan::{ReadOptions, SeriesChoice, SeriesSummary, Warning, WarningCode};
 
-/// What the files of a folder turned out to be.
+/// The files of a folder, sorted by kind and series.
 pub(super) struct Sorted {
-    /// By series number, then by first file.
+    /// Ordered by series number, then by first file.
     series: Vec<Member>,
     localizers: usize,
     others: usize,
-    /// Files that a DICOMDIR names and that are not there.
+    /// Number of missing files listed in a DICOMDIR.
     missing: usize,
 }
 
 struct Member {
     uid: String,
     summary: SeriesSummary,
-    /// Empty for modalities that are not read.
+    /// Empty for modalities that are not supported.
     slices: Vec<Slice>,
-    /// Why the first image that cannot be read is refused, and the series with it.
+    /// Why the first unreadable image, and its series with it, is refused.
     refused: Option<ReadError>,
 }
 
@@ -48,9 +48,9 @@ impl Member {
 pub(super) struct Chosen {
     pub slices: Vec<Slice>,
     pub modality: Option<String>,
-    /// Where it is not CT.
+    /// Warning if the modality is not CT.
     pub modality_warning: Option<Warning>,
-    /// This one and those that were left.
+    /// This series and those that were not read.
     pub all: Vec<SeriesSummary>,
 }
 
@@ -98,7 +98,7 @@ impl Sorted {
         }
     }
 
-    /// What was left out of every series.
+    /// Warnings about files that belong to no series.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if self.localizers > 0 {
@@ -128,7 +128,7 @@ impl Sorted {
         warnings
     }
 
-    /// The series asked for, or the only one there is.
+    /// Returns the series asked for, or the only one present.
     pub fn choose(
         mut self,
         source: &Path,

@@ -17,14 +17,14 @@ use gaps::{fill, filled};
 use steps::Steps::{Even, Uneven};
 use steps::{distinct_places, even_step};
 
-/// A step that leans less than this from the normal is rounding, not a tilted gantry.
+/// Largest tilt of the step from the normal that is attributed to rounding rather than a tilted gantry.
 const TILT_DEG: f64 = 0.5;
 
 /// The lattice that a series spans.
 #[derive(Debug)]
 pub(super) struct Stack {
     order: Vec<usize>,
-    /// For each slice of the lattice its place among the slices in order; `None` where it is one of them.
+    /// Place of each lattice slice among the sorted slices; `None` if the two are the same.
     between: Option<Vec<Between>>,
     size: [usize; 3],
     ct_from_voxel: Affine3<f64>,
@@ -114,12 +114,12 @@ impl Stack {
         })
     }
 
-    /// Slices (as given) from the first to the last along k.
+    /// Indices of the given slices from first to last along k.
     pub(super) fn order(&self) -> &[usize] {
         &self.order
     }
 
-    /// Where the slices of the lattice lie among those in order; `None` where they are the same.
+    /// Places of the lattice slices among the sorted slices; `None` if the two are the same.
     pub(super) fn between(&self) -> Option<&[Between]> {
         self.between.as_deref()
     }
@@ -137,7 +137,7 @@ impl Stack {
         Grid::new(self.size, self.ct_from_voxel)
     }
 
-    /// What was odd about the geometry.
+    /// Warnings about the geometry.
     pub(super) fn warnings(&self) -> impl Iterator<Item = Warning> {
         self.warnings.iter().cloned()
     }

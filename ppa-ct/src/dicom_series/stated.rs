@@ -14,7 +14,7 @@ use super::header::Image;
 use super::stored::StoredFormat;
 use crate::acquisition::Acquisition;
 
-/// Reads the facts of one file, whose frames are taken to be made alike.
+/// Reads the facts of one file, whose frames are assumed to be acquired alike.
 pub(super) fn stated(top: &Attributes, image: &Image, first: Option<&Frame>) -> Acquisition {
     let text = |tag| top.data_set.get(tag).map(file::text);
     let number = |tag| text(tag)?.parse::<f64>().ok().filter(|v| v.is_finite());
@@ -98,7 +98,7 @@ const TELLING: [Tag; 44] = [
     tags::PERFORMED_PROCEDURE_STEP_DESCRIPTION,
 ];
 
-/// UIDs that name a kind of object, not an instance.
+/// UIDs that denote a kind of object, not an instance.
 const KINDS: [Tag; 3] = [
     tags::SOP_CLASS_UID,
     tags::REFERENCED_SOP_CLASS_UID,
@@ -108,13 +108,13 @@ const KINDS: [Tag; 3] = [
 fn collect_identifiers(data_set: &DataSet, depth: usize, found: &mut BTreeSet<&'static str>) {
     for element in data_set.elements() {
         let tag = element.tag;
-        // Servers write UN for what they do not know (PS3.5, section 6.2.2).
+        // Servers write UN for unknown attributes (PS3.5, section 6.2.2).
         let vr = element.vr().filter(|vr| *vr != VR::UN).unwrap_or_else(|| {
             let known = StandardDataDictionary.by_tag(tag);
             known.map_or(VR::UN, |entry| entry.vr.relaxed())
         });
         if vr == VR::SQ && depth > 0 {
-            // A damaged sequence that nothing else needs does not stop the reading.
+            // A damaged sequence that nothing else needs does not stop reading.
             let items = data_set.items_of(element).unwrap_or_default();
             for item in &items {
                 collect_identifiers(item, depth - 1, found);
@@ -186,7 +186,7 @@ mod tests {
         assert_eq!(identifiers(&second.concat()), ["PatientID"]);
     }
 
-    /// Elements of unknown representation are known by their tags; their items are written implicitly.
+    /// Elements of unknown representation are recognised by their tags; their items are written implicitly.
     #[test]
     fn unknown_representations_do_not_hide_an_identifier() {
         let implicit = b"\x10\0\x10\0\x08\0\0\0Doe^John";

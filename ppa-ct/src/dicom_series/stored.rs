@@ -5,19 +5,19 @@ use dicom_dictionary_std::tags;
 use super::attributes::Attributes;
 use crate::error::ReadError;
 
-/// HU of padding that does not read as air by itself.
+/// HU assigned to padding that does not read as air by itself.
 const AIR_HU: f32 = -1000.0;
-/// Values that read as air: noise and scanners that end their scale at -1024.
+/// Values that read as air: includes noise and scanners whose scale ends at -1024.
 const READS_AS_AIR: std::ops::RangeInclusive<f32> = -1100.0..=-900.0;
 
-/// How a stored value sits in its container (DICOM PS3.5, section 8.1.1), and which values are no measurement.
+/// Layout of a stored value in its container (DICOM PS3.5, section 8.1.1), and which values are not measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct StoredFormat {
     /// 8, 16 or 32.
     pub bits_allocated: u32,
     /// Bits that carry the value.
     pub bits_stored: u32,
-    /// Position of the topmost of them.
+    /// Position of the most significant stored bit.
     pub high_bit: u32,
     pub signed: bool,
     /// Smallest and largest stored value that pads the image (PS3.3, section C.7.5.1.1.2).
@@ -49,7 +49,7 @@ impl StoredFormat {
                 "8, 16 or 32, with the stored bits within them",
             ));
         }
-        // Padding is written as a value, not as a container; files disagree on its sign.
+        // Padding is stated as a value, not as a container; files disagree on its sign.
         let value = |word: u16| match format.signed {
             true => i64::from(word.cast_signed()),
             false => i64::from(word),
@@ -64,13 +64,13 @@ impl StoredFormat {
         Ok(format)
     }
 
-    /// Bytes of a container.
+    /// Size of a container in bytes.
     pub fn bytes(&self) -> usize {
         self.bits_allocated as usize / 8
     }
 
-    /// Fills `hu` from little-endian containers with whole numbers; returns how many pixels were padding and
-    /// became air, or `None` where the values are not whole or 16 bits do not hold them.
+    /// Fills `hu` from little-endian containers with whole numbers; returns the number of padding pixels set to air, or `None`
+    /// if the values are not whole or do not fit in 16 bits.
     ///
     /// `hu` and `containers` hold the same number of pixels.
     pub fn read_whole(
@@ -99,7 +99,7 @@ impl StoredFormat {
         let [first_air, last_air] = [READS_AS_AIR.start(), READS_AS_AIR.end()].map(|&v| v as i32);
         let put = |(hu, stored): (&mut i16, i32)| {
             let value = stored + intercept;
-            // No branches: this is vector code.
+            // Branch-free so that it vectorises.
             let pads =
                 (low <= stored) & (stored <= high) & !((first_air <= value) & (value <= last_air));
             let value = if pads { AIR_HU as i32 } else { value };
@@ -118,7 +118,7 @@ impl StoredFormat {
         (lost == 0).then_some(padded as usize)
     }
 
-    /// Fills `hu` from little-endian containers; returns how many pixels were padding and became air.
+    /// Fills `hu` from little-endian containers; returns the number of padding pixels set to air.
     ///
     /// `hu` and `containers` hold the same number of pixels.
     pub fn read_hu(&self, containers: &[u8], rescale: [f64; 2], hu: &mut [f32]) -> usize {
@@ -174,13 +174,13 @@ impl StoredFormat {
         }
     }
 
-    /// Shifts of a container of 32 bits, up and then down, that leave the stored ones.
+    /// Shifts of a 32-bit container, left and then right, that leave the stored bits.
     fn shifts(&self) -> (u32, u32) {
         (31 - self.high_bit, 32 - self.bits_stored)
     }
 }
 
-/// The intercept, where stored numbers and HU differ by a whole number only.
+/// The intercept, if stored numbers and HU differ only by a whole number.
 pub(super) fn whole_intercept([slope, intercept]: [f64; 2]) -> Option<i32> {
     let small = intercept.abs() < 256.0 * 256.0;
     (slope == 1.0 && intercept.fract() == 0.0 && small).then_some(intercept as i32)
@@ -192,7 +192,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Whatever sits in the unused bits, the value that was put in comes out.
+        /// The stored value is recovered whatever the unused bits are.
         #[test]
         fn stored_value_survives_its_container(
             (allocated, stored, high) in prop::sample::select(vec![8_u32, 16, 32])
@@ -217,7 +217,7 @@ mod tests {
             format.read_hu(&container.to_le_bytes()[..format.bytes()], rescale, &mut hu);
             prop_assert_eq!(hu[0], (rescale[0] * expected as f64 + rescale[1]) as f32);
 
-            // The same in 16 bits, where these hold it.
+            // The same in 16 bits, if it fits.
             let mut whole = [0];
             let containers = &container.to_le_bytes()[..format.bytes()];
             let read = format.read_whole(containers, rescale, &mut whole);
@@ -239,9 +239,9 @@ mod tests {
         let stored = [-2000_i16, -1990, -1989, 40].map(i16::to_le_bytes).concat();
         for (intercept, padded, expected) in [
             (-1024, 2, [-1000, -1000, -3013, -984]),
-            // Air already: what other readers give is kept.
+            // Already air: the value that other readers give is kept.
             (976, 0, [-1024, -1014, -1013, 1016]),
-            // -32770 is padding and needs no place among 16 bits.
+            // -32770 is padding and need not fit in 16 bits.
             (-30_770, 2, [-1000, -1000, -32_759, -30_730]),
         ] {
             let (mut hu, mut whole) = ([0.0; 4], [0; 4]);

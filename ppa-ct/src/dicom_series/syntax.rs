@@ -1,4 +1,4 @@
-//! Transfer syntaxes: names, and support.
+//! Names of transfer syntaxes, and which are supported.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use super::codec::Codec;
 use super::element::Encoding;
 use crate::error::ReadError;
 
-/// How the elements of a file with this transfer syntax are written.
+/// Encoding of the elements of a file with this transfer syntax.
 ///
 /// # Errors
-/// For encodings that are not known: their elements may be written in any way.
+/// For unknown encodings: their elements may be written in any way.
 pub(super) fn encoding(path: &Path, uid: &str) -> Result<Encoding, ReadError> {
     match uid {
         "1.2.840.10008.1.2" => Ok(Encoding::ImplicitLittle),
@@ -36,7 +36,7 @@ pub(super) fn codec(path: &Path, uid: &str) -> Result<Codec, ReadError> {
     }
 }
 
-/// Error for pixels that cannot be unpacked.
+/// Error for pixels that cannot be decoded.
 pub(super) fn unsupported(
     path: &Path,
     uid: &str,
@@ -50,7 +50,7 @@ pub(super) fn unsupported(
     }
 }
 
-/// A UID as messages may repeat it: any text may stand in its place, and other roots than DICOM's name an institution.
+/// A UID that messages may repeat: the field may contain any text, and roots other than DICOM's name an institution.
 fn shown(uid: &str) -> &str {
     let digits = |c: char| c.is_ascii_digit() || c == '.';
     match uid.starts_with("1.2.840.10008.") && uid.len() <= 64 && uid.chars().all(digits) {
@@ -65,7 +65,7 @@ fn name(uid: &str) -> Option<&'static str> {
         "1.2.840.10008.1.2" => "implicit VR little endian",
         "1.2.840.10008.1.2.1" => "explicit VR little endian",
         "1.2.840.10008.1.2.1.99" => "deflated explicit VR little endian",
-        // Retired too, but read.
+        // Also retired, but supported.
         "1.2.840.10008.1.2.2" => "explicit VR big endian",
         "1.2.840.10008.1.2.4.50" => "JPEG baseline, process 1",
         "1.2.840.10008.1.2.4.51" => "JPEG extended, processes 2 and 4",

@@ -13,7 +13,7 @@ use crate::dicom_series::RIGHT_ANGLE;
 use crate::error::WriteError;
 use crate::volume::Volume;
 
-/// A volume about to become DICOM slices.
+/// A volume to be written as DICOM slices.
 pub(super) struct CtSeries<'a> {
     volume: &'a Volume,
     /// Columns and rows of a slice.
@@ -120,7 +120,7 @@ impl<'a> CtSeries<'a> {
             &decimals(position.coords.iter().copied()),
         );
         image.text(tags::IMAGE_ORIENTATION_PATIENT, &decimals(cosines));
-        // Between rows (along j) first.
+        // The distance between rows (along j) comes first.
         image.text(tags::PIXEL_SPACING, &decimals([spacing.y, spacing.x]));
         image.text(tags::SLICE_THICKNESS, &decimal(self.thickness_mm));
     }

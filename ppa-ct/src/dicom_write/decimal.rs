@@ -3,7 +3,7 @@
 /// Longest decimal string (PS3.5, section 6.2).
 const CHARACTERS: usize = 16;
 
-/// The decimal string nearest to a finite number.
+/// Returns the decimal string nearest to a finite number.
 pub(super) fn decimal(value: f64) -> String {
     let exact = value.to_string();
     if exact.len() <= CHARACTERS {
@@ -19,7 +19,7 @@ pub(super) fn decimal(value: f64) -> String {
         .unwrap_or(exact)
 }
 
-/// Several decimal strings in one value.
+/// Joins several decimal strings in one value.
 pub(super) fn decimals(values: impl IntoIterator<Item = f64>) -> String {
     values
         .into_iter()
@@ -34,7 +34,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Sign, point and exponent such as `e-300` leave eight digits and more.
+        /// Sign, point and an exponent such as `e-300` leave at least eight digits.
         #[test]
         fn decimal_strings_fit_and_say_the_number(
             mantissa in -1.0..1.0_f64,

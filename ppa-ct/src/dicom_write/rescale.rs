@@ -14,7 +14,7 @@ pub(super) struct Rescale {
 }
 
 impl Rescale {
-    /// One HU per level where that is exact, else the range spread over all levels.
+    /// One HU per level if that is exact, otherwise the range spread over all levels.
     pub(super) fn of(hu: Values) -> Self {
         let (low, high) = hu.range();
         let (low, high) = (f64::from(low), f64::from(high));
@@ -47,7 +47,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The stated error: half a level, and what 16 characters and f32 leave out.
+        /// The stated error: half a level, plus rounding to 16 characters and f32.
         #[test]
         fn values_come_back_within_half_a_level(
             hu in prop::collection::vec(-5e4..5e4_f32, 1..40),

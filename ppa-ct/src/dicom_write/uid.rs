@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 
 use crate::volume::Volume;
 
-/// A fingerprint of the voxels and their places.
+/// A fingerprint of the voxels and their positions.
 pub(super) struct Fingerprint([u8; 32]);
 
 impl Fingerprint {
@@ -24,7 +24,7 @@ impl Fingerprint {
         Self(hash.finalize().into())
     }
 
-    /// A UID under the root 2.25 for one thing made from the volume: a UUID of version 8 (RFC 9562) as a decimal number.
+    /// A UID under the root 2.25 for one object made from the volume: a UUID of version 8 (RFC 9562) as a decimal number.
     pub(super) fn uid(&self, thing: &str, number: usize) -> String {
         let mut hash = Sha256::new();
         hash.update(self.0);

@@ -8,7 +8,7 @@ use super::Cause;
 use crate::scan::SeriesSummary;
 use crate::volume_error::VolumeError;
 
-/// Why a scan was refused.
+/// Why a scan could not be read.
 ///
 /// Messages name files and numbers only, never what a header says about a person.
 #[derive(Debug, thiserror::Error)]
@@ -17,9 +17,9 @@ pub enum ReadError {
     /// The file or folder cannot be opened or read.
     #[error("cannot read {}", path.display())]
     Io {
-        /// What was asked for.
+        /// The path asked for.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: std::io::Error,
     },
     /// Neither a folder of DICOM files, nor a DICOM file, nor NIfTI, NRRD or MetaImage.
@@ -41,17 +41,17 @@ pub enum ReadError {
     NoDicom {
         /// The folder.
         path: PathBuf,
-        /// Files in it.
+        /// Number of files in it.
         files: usize,
-        /// The first file of the folder itself that has the name of another format.
+        /// The first file in the folder itself that has the name of another format.
         volume: Option<PathBuf>,
     },
-    /// A DICOMDIR whose files are not there.
+    /// A DICOMDIR none of whose files exists.
     #[error("{} is a DICOM directory, but none of the {missing} files that it lists exists below its folder", path.display())]
     EmptyDirectory {
         /// The directory.
         path: PathBuf,
-        /// Files that it names.
+        /// Number of files that it lists.
         missing: usize,
     },
     /// A file that starts as DICOM cannot be parsed to the end.
@@ -59,10 +59,10 @@ pub enum ReadError {
     Dicom {
         /// The file.
         path: PathBuf,
-        /// What the parser says.
+        /// The parser's error.
         source: Cause,
     },
-    /// An attribute that the geometry or the pixel values need is missing.
+    /// A missing attribute that is needed for the geometry or the pixel values.
     #[error("{} lacks {tag}", path.display())]
     MissingTag {
         /// The file.
@@ -70,7 +70,7 @@ pub enum ReadError {
         /// DICOM keyword.
         tag: &'static str,
     },
-    /// An attribute holds something unusable.
+    /// An attribute with an unusable value.
     #[error("{}: {tag} is {found}, expected {expected}", path.display())]
     BadTag {
         /// The file.
@@ -79,7 +79,7 @@ pub enum ReadError {
         tag: &'static str,
         /// The value.
         found: String,
-        /// What it should have been.
+        /// The expected value.
         expected: &'static str,
     },
     /// Another modality than CT: its values are not Hounsfield units.
@@ -103,15 +103,15 @@ pub enum ReadError {
     SeveralSeries {
         /// The folder.
         path: PathBuf,
-        /// Each series, by number.
+        /// All series, by number.
         series: Vec<SeriesSummary>,
     },
-    /// The series that was chosen is not there.
+    /// The chosen series does not exist.
     #[error("{} does not hold the chosen series; it holds {}", path.display(), list_series(series))]
     NoSuchSeries {
         /// The folder or file.
         path: PathBuf,
-        /// Each series that is there, by number.
+        /// All series present, by number.
         series: Vec<SeriesSummary>,
     },
     /// Nothing but localizers (scout views).
@@ -119,39 +119,39 @@ pub enum ReadError {
     OnlyLocalizers {
         /// The folder.
         path: PathBuf,
-        /// Localizers found.
+        /// Number of localizers.
         localizers: usize,
     },
-    /// A multi-frame object that does not state where its frames lie.
+    /// A multi-frame object that does not state the positions of its frames.
     #[error("{} holds {} but positions for {described} of them", path.display(), count(*frames, "frame"))]
     MultiFrame {
         /// The file.
         path: PathBuf,
-        /// Frames in it.
+        /// Number of frames.
         frames: usize,
         /// Frames with functional groups of their own.
         described: usize,
     },
-    /// No decoder for the way the pixels are packed.
+    /// No decoder for the encoding of the pixels.
     #[error("cannot decode the pixels of {}: transfer syntax {name} ({uid})", path.display())]
     TransferSyntax {
         /// The file.
         path: PathBuf,
-        /// Transfer syntax UID: names an encoding, never a person.
+        /// Transfer syntax UID; it names an encoding, never a person.
         uid: String,
-        /// Its name.
+        /// Name of the transfer syntax.
         name: &'static str,
-        /// What the decoder says.
+        /// The decoder's error.
         source: Cause,
     },
-    /// The pixel data do not have the size that the header promises, or are compressed more than is plausible.
+    /// The size of the pixel data does not match the header, or they are compressed more than is plausible.
     #[error("{} holds {found} bytes of pixel data, which do not match the {expected} bytes specified by its header", path.display())]
     PixelCount {
         /// The file.
         path: PathBuf,
         /// Bytes found, compressed or not.
         found: u64,
-        /// Bytes promised, not compressed.
+        /// Bytes expected from the header, not compressed.
         expected: u64,
     },
     /// Slices of one series that do not fit on one lattice.
@@ -161,12 +161,12 @@ pub enum ReadError {
         path: PathBuf,
         /// What differs.
         what: &'static str,
-        /// Its value there.
+        /// Its value in that file.
         found: String,
         /// The value in the first slice.
         expected: String,
     },
-    /// Several slices in one place, as in a series with phases or without true positions.
+    /// Several slices at the same position, as in a series with phases or without true positions.
     #[error(
         "{}: {slices} slices share the position ({:.3}, {:.3}, {:.3}) mm; distinct positions of all {total}: {positions}",
         path.display(), number(position_mm[0]), number(position_mm[1]), number(position_mm[2])
@@ -174,13 +174,13 @@ pub enum ReadError {
     SamePosition {
         /// The folder.
         path: PathBuf,
-        /// Slices at the most crowded position.
+        /// Number of slices at the most crowded position.
         slices: usize,
         /// That position, LPS.
         position_mm: [f64; 3],
-        /// Slices altogether.
+        /// Total number of slices.
         total: usize,
-        /// Distinct positions.
+        /// Number of distinct positions.
         positions: usize,
     },
     /// Slices are missing, or their steps vary.
@@ -193,42 +193,42 @@ pub enum ReadError {
         /// Steps that differ.
         gaps: Vec<Gap>,
     },
-    /// Slices that do not follow each other along one line.
+    /// Slices whose positions are not on one line.
     #[error("the slices in {} do not lie on one line: slice {slice} is {off_mm:.3} mm off the line from the first to the last", path.display())]
     Sideways {
         /// The folder.
         path: PathBuf,
         /// The slice farthest from the line, counted from 0 along the slice normal.
         slice: usize,
-        /// How far.
+        /// Distance from the line.
         off_mm: f64,
     },
-    /// Gaps that would take far more slices to fill than there are.
+    /// Gaps that would take far more slices to fill than exist.
     #[error("filling the gaps between the {slices} slices in {} would give {needed:.0} slices, expected at most {most}", path.display())]
     TooManyGaps {
         /// The folder.
         path: PathBuf,
-        /// Slices that are there.
+        /// Slices present.
         slices: usize,
         /// Slices of the even stack.
         needed: f64,
-        /// Most slices of an even stack.
+        /// Largest number of slices of an even stack.
         most: usize,
     },
-    /// A NIfTI, NRRD or MetaImage file whose header cannot be used.
+    /// A NIfTI, NRRD or MetaImage file with an unusable header.
     #[error("{}: {problem}", path.display())]
     Header {
         /// The file.
         path: PathBuf,
-        /// What was found and what expected.
+        /// What was found and what was expected.
         problem: String,
     },
-    /// The values or the affine do not make a volume.
+    /// The values or the affine do not form a volume.
     #[error("{} does not hold a usable volume", path.display())]
     Volume {
         /// The file or folder.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: VolumeError,
     },
 }
@@ -243,7 +243,7 @@ pub struct Gap {
 }
 
 impl ReadError {
-    /// What is wrong with an image, without the file's name.
+    /// Describes what is wrong with an image, without the name of the file.
     #[cfg(feature = "dicom")]
     pub(crate) fn without_path(&self) -> String {
         match self {
@@ -297,7 +297,7 @@ fn list_gaps(gaps: &[Gap]) -> String {
     text
 }
 
-/// Which file of a folder without DICOM can be read by itself.
+/// Hint at a file in a folder without DICOM that can be read by itself.
 fn other_format(volume: Option<&Path>) -> String {
     match volume {
         Some(file) => format!("; name the file {} itself to read it", file.display()),

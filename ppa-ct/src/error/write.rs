@@ -8,12 +8,12 @@ use super::Cause;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The name does not say a format that can be written.
+    /// The name does not belong to a format that can be written.
     #[error("cannot write {}: expected {expected}", path.display())]
     Extension {
         /// The name given.
         path: PathBuf,
-        /// Names that can be written.
+        /// Names that are supported.
         expected: &'static str,
     },
     /// A name that the header of the format cannot hold.
@@ -21,10 +21,10 @@ pub enum WriteError {
     Name {
         /// The name given.
         path: PathBuf,
-        /// Which names can be written.
+        /// Names that the format supports.
         expected: &'static str,
     },
-    /// A DICOM CT was asked for, and the source says that the scan is none.
+    /// A DICOM CT was asked for, but the source says that the scan is not a CT.
     #[error("{} would be a DICOM CT in Hounsfield units, but the scan holds {found}: write NIfTI, NRRD or MetaImage", path.display())]
     NotCt {
         /// The folder asked for.
@@ -47,18 +47,18 @@ pub enum WriteError {
         size: [usize; 3],
         /// The format.
         format: &'static str,
-        /// Voxels it holds along an axis.
+        /// Largest number of voxels along an axis.
         most: usize,
     },
-    /// The axes i and j are not perpendicular: no DICOM slice.
+    /// The axes i and j are not perpendicular, as a DICOM slice requires.
     #[error(
         "the axes i and j deviate by {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot represent"
     )]
     SlantedSlices {
-        /// How far from perpendicular.
+        /// Deviation from perpendicular.
         lean_deg: f64,
     },
-    /// A folder to be written holds something already.
+    /// The folder to be written is not empty.
     #[error("{} exists and is not an empty folder; nothing was written", path.display())]
     Exists {
         /// The folder asked for.
@@ -69,7 +69,7 @@ pub enum WriteError {
     Encode {
         /// The file asked for.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: Cause,
     },
     /// The file could not be written; nothing is left behind.
@@ -77,7 +77,7 @@ pub enum WriteError {
     Io {
         /// The file asked for.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: std::io::Error,
     },
 }

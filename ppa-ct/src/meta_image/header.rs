@@ -11,7 +11,7 @@ use crate::stored::{Number, Stored};
 /// Longest header read, lines.
 const MOST_LINES: usize = 10_000;
 
-/// Keys of the format; ITK writes whatever else it knows of an image, DICOM attributes among it, as further ones.
+/// Keys of the format; ITK adds further ones for whatever else it knows of an image, such as DICOM attributes.
 const KEYS: &[&str] = &[
     "ObjectType",
     "ObjectSubType",
@@ -54,16 +54,16 @@ pub(super) struct Header {
     values: HashMap<String, String>,
 }
 
-/// Where the voxels are.
+/// Location of the voxels.
 pub(super) enum Data<'a> {
-    /// Behind the header.
+    /// After the header.
     Here,
-    /// In a file of this name beside the header.
+    /// In a file of this name next to the header.
     Beside(&'a str),
 }
 
 impl Header {
-    /// Reads up to `ElementDataFile`, which is the last key by the format's rules.
+    /// Reads up to `ElementDataFile`, which the format requires to be last.
     pub(super) fn read(file: &mut ScanFile) -> Result<Self, ReadError> {
         let mut values = HashMap::new();
         for number in 1..MOST_LINES {
@@ -71,7 +71,7 @@ impl Header {
             if line.trim().is_empty() && line.ends_with('\n') {
                 continue;
             }
-            // Messages leave the words of a line out: they may be about a person.
+            // Messages do not repeat the words of a line: they may be about a person.
             let Some((key, value)) = line.split_once(['=', ':']) else {
                 return Err(file.header(if line.is_empty() {
                     "the header ends without ElementDataFile".to_owned()
@@ -91,7 +91,7 @@ impl Header {
         Err(file.header(format!("the header does not end within {MOST_LINES} lines")))
     }
 
-    /// What the header holds in words of its writer's choice, by name.
+    /// Names of the fields with text chosen by the writer.
     pub(super) fn free_text(&self) -> BTreeSet<&'static str> {
         let further = self
             .values
@@ -107,7 +107,7 @@ impl Header {
             .collect()
     }
 
-    /// The value of the first of these keys that is there.
+    /// Value of the first of these keys that is present.
     fn get(&self, keys: &[&str]) -> Option<&str> {
         keys.iter()
             .find_map(|key| self.values.get(*key))
@@ -119,11 +119,11 @@ impl Header {
             .ok_or_else(|| format!("the header lacks {key}"))
     }
 
-    /// A yes or no.
+    /// Parses a yes or no.
     fn flag(&self, keys: &[&str], default: bool) -> Result<bool, String> {
         match self.get(keys) {
             None => Ok(default),
-            // As MetaIO, which looks at the first letter.
+            // MetaIO also looks only at the first letter.
             Some(value) if value.starts_with(['T', 't', '1']) => Ok(true),
             Some(value) if value.starts_with(['F', 'f', '0']) => Ok(false),
             Some(value) => Err(format!("{} is {value}, expected True or False", keys[0])),
@@ -169,7 +169,7 @@ impl Header {
             "MET_UCHAR" => Number::U8,
             "MET_SHORT" => Number::I16,
             "MET_USHORT" => Number::U16,
-            // A long has four bytes here, whatever the machine.
+            // A long has four bytes here on any machine.
             "MET_INT" | "MET_LONG" => Number::I32,
             "MET_UINT" | "MET_ULONG" => Number::U32,
             "MET_LONG_LONG" => Number::I64,
@@ -194,7 +194,7 @@ impl Header {
         self.flag(&["CompressedData"], false)
     }
 
-    /// Bytes before the voxels in a file of their own; `None` for all that the voxels leave.
+    /// Bytes before the voxels in a separate data file; `None` if the voxels are at its end.
     pub(super) fn header_size(&self) -> Result<Option<u64>, String> {
         match self.get(&["HeaderSize"]).unwrap_or("0") {
             "-1" => Ok(None),
@@ -205,7 +205,7 @@ impl Header {
         }
     }
 
-    /// Voxel-to-LPS affine, and whether the header gives orientation and position.
+    /// Voxel-to-LPS affine, and whether the header states orientation and position.
     pub(super) fn ct_from_voxel(&self) -> Result<(Affine3<f64>, bool), String> {
         let mm = match self.get(&["DistanceUnits"]).unwrap_or("mm") {
             "mm" | "?" => 1.0,
@@ -241,7 +241,7 @@ impl Header {
         ))
     }
 
-    /// `CT`, `MR`, `NM` or `US`; `None` where the header does not say.
+    /// `CT`, `MR`, `NM` or `US`; `None` if the header does not say.
     pub(super) fn modality(&self) -> Result<Option<&str>, String> {
         let stated = self.get(&["Modality"]).unwrap_or("MET_MOD_UNKNOWN");
         match stated.strip_prefix("MET_MOD_") {
@@ -265,14 +265,14 @@ impl Header {
     }
 }
 
-/// Whether readers take this for the name of one data file, and for this name: MetaIO, which ITK reads with, takes
-/// whatever begins with LIST for a list, and blanks at the ends are dropped.
+/// Whether readers take this for the name of one data file, and for exactly this name: MetaIO, which ITK reads with, takes
+/// anything that begins with LIST for a list, and drops blanks at the ends.
 pub(super) fn is_data_file(name: &str) -> bool {
     let special = |c: char| c == '%' || c == '\\' || c.is_control();
     name.trim() == name && !name.starts_with("LIST") && !name.contains(special)
 }
 
-/// `N` finite numbers parted by blanks.
+/// Parses `N` finite numbers separated by blanks.
 fn numbers<const N: usize>(key: &str, text: &str) -> Result<[f64; N], String> {
     let finite = |n: &str| n.parse().ok().filter(|v: &f64| v.is_finite());
     let found = text.split_whitespace().map(finite);

@@ -14,20 +14,20 @@ use crate::scan_file::ScanFile;
 use crate::stored::write_exact;
 use crate::volume::Volume;
 
-/// Writes a volume as `.mha`, or as `.mhd` with its voxels in a `.zraw` beside it.
+/// Writes a volume as `.mha`, or as `.mhd` with its voxels in a `.zraw` next to it.
 ///
-/// Voxels are deflated; whole numbers that fit are stored as int16, anything else as float32. The
-/// affine may be sheared. A file appears whole or not at all, and its bytes depend on the volume and
-/// the file name only. The data file of `leg.mhd` is called `leg.<checksum of the voxels>.zraw`: an earlier pair of that name, if any, stays readable
-/// until the new header replaces its own, and then its data file is removed.
+/// Voxels are deflated; integers that fit are stored as int16, anything else as float32. The affine
+/// may be sheared. A file is written completely or not at all, and its bytes depend only on the volume and
+/// the file name. The data file of `leg.mhd` is called `leg.<checksum of the voxels>.zraw`: an earlier pair of that name, if any, stays
+/// readable until the new header replaces its own, and then its data file is removed.
 ///
 /// # Errors
-/// [`WriteError`] for another extension, a name that the header cannot hold, and a file system that refuses.
+/// [`WriteError`] for another extension, a name that the header cannot hold, and failures of the file system.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let extension = path.extension().unwrap_or_default();
     if extension.eq_ignore_ascii_case("mha") {
         whole_file::write_with(path, |out| {
-            // The header states the packed length, which is known last: it is written again, no longer.
+            // The header states the packed length, which is known last: it is overwritten by one that is not longer.
             out.write_all(header(volume, 0, "LOCAL").as_bytes())?;
             let packed = write_packed(out, volume)?;
             out.rewind()?;
@@ -71,7 +71,7 @@ fn write_pair(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     .map_err(io_at(&data))?;
     let header = header(volume, packed, &name);
     let written = whole_file::write(path, header.as_bytes());
-    // Voxels without a header are of no use; whether they can be removed matters less than what was asked for.
+    // Voxels without a header are useless; a failure to remove them matters less than the result of the write.
     let unused = match &written {
         Ok(()) => before.filter(|before| *before != data),
         Err(_) => Some(data).filter(|data| before.as_ref() != Some(data)),
@@ -82,7 +82,7 @@ fn write_pair(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     written.map_err(io_at(path))
 }
 
-/// The data file of the pair that has this header, if its name is like ours: others may be shared.
+/// Data file of the pair that has this header, if its name has our form: others may be shared.
 fn data_file_before(path: &Path) -> Option<PathBuf> {
     let header = Header::read(&mut ScanFile::open(path).ok()?).ok()?;
     let Ok(Data::Beside(name)) = header.data() else {
@@ -104,16 +104,16 @@ fn checksum(volume: &Volume) -> io::Result<u32> {
     Ok(sum.crc().sum())
 }
 
-/// Writes the deflated voxels and returns how many bytes they are.
+/// Writes the deflated voxels and returns their length in bytes.
 fn write_packed(out: &mut dyn Write, volume: &Volume) -> io::Result<u64> {
-    // CT noise hardly compresses: higher levels cost time and save a few percent.
+    // CT noise hardly compresses: higher levels take longer and save a few percent.
     let mut zlib = ZlibEncoder::new(out, Compression::fast());
     write_exact(&mut zlib, volume.values())?;
     zlib.try_finish()?;
     Ok(zlib.total_out())
 }
 
-/// As long for any number of packed bytes.
+/// Makes a header whose length does not depend on the number of packed bytes.
 fn header(volume: &Volume, packed_bytes: u64, data: &str) -> String {
     let grid = volume.grid();
     let kind = if volume.values().fit_i16() {
@@ -121,7 +121,7 @@ fn header(volume: &Volume, packed_bytes: u64, data: &str) -> String {
     } else {
         "MET_FLOAT"
     };
-    // Rust prints the shortest decimals that come back as the same number.
+    // Rust prints the shortest decimals that parse to the same number.
     let list = |numbers: &[f64]| {
         numbers
             .iter()

@@ -1,4 +1,4 @@
-//! From NIfTI header fields to the affine, and back.
+//! Conversion between NIfTI header fields and the affine.
 
 use nalgebra::{Affine3, Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use nifti::NiftiHeader;
@@ -12,14 +12,14 @@ fn mm_per_unit(header: &NiftiHeader) -> f64 {
     }
 }
 
-/// World axes turned from RAS to LPS, or back.
+/// Converts world axes from RAS to LPS, or back.
 fn flip_x_y(matrix: &Matrix4<f64>) -> Matrix4<f64> {
     Matrix4::from_diagonal(&nalgebra::Vector4::new(-1.0, -1.0, 1.0, 1.0)) * matrix
 }
 
-/// Voxel-to-LPS affine, and whether the header gives an orientation at all.
+/// Voxel-to-LPS affine, and whether the header states an orientation at all.
 ///
-/// The sform wins over the qform, and that over bare spacings (methods 3, 2 and 1 of `nifti1.h`).
+/// The sform takes precedence over the qform, and that over bare spacings (methods 3, 2 and 1 of `nifti1.h`).
 pub(super) fn ct_from_voxel(header: &NiftiHeader) -> Result<(Affine3<f64>, bool), String> {
     let ras = if header.sform_code > 0 {
         sform(header)
@@ -61,7 +61,7 @@ fn spacing(header: &NiftiHeader) -> Result<Vector3<f64>, String> {
 
 fn qform(header: &NiftiHeader, spacing: Vector3<f64>) -> Matrix4<f64> {
     let bcd = Vector3::new(header.quatern_b, header.quatern_c, header.quatern_d).map(f64::from);
-    // a is not stored; where rounding leaves nothing for it, the turn is by 180 degrees.
+    // a is not stored; if rounding leaves nothing for it, the rotation is by 180 degrees.
     let a = (1.0 - bcd.norm_squared()).max(0.0).sqrt();
     let turn = UnitQuaternion::new_normalize(Quaternion::from_parts(a, bcd));
     let qfac = if header.pixdim[0] < 0.0 { -1.0 } else { 1.0 };
@@ -74,9 +74,9 @@ fn qform(header: &NiftiHeader, spacing: Vector3<f64>) -> Matrix4<f64> {
     matrix
 }
 
-/// Writes the affine into the sform, and into the qform where that can hold it (no shear).
+/// Writes the affine to the sform, and to the qform if that can represent it (no shear).
 pub(super) fn set_affine(header: &mut NiftiHeader, ct_from_voxel: &Affine3<f64>) {
-    /// Coordinates of the scanner.
+    /// Code of scanner coordinates.
     const SCANNER: i16 = 1;
     let ras = flip_x_y(ct_from_voxel.matrix());
     let row = |row: usize| [0, 1, 2, 3].map(|column| ras[(row, column)] as f32);
@@ -98,7 +98,7 @@ pub(super) fn set_affine(header: &mut NiftiHeader, ct_from_voxel: &Affine3<f64>)
     }
     let proper = axes * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, qfac));
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(proper));
-    // Both signs are the same turn; the format wants a >= 0.
+    // Both signs are the same rotation; the format requires a >= 0.
     let turn = if turn.w < 0.0 { -*turn } else { *turn };
     [header.quatern_b, header.quatern_c, header.quatern_d] =
         [turn.i as f32, turn.j as f32, turn.k as f32];

@@ -13,18 +13,18 @@ use crate::error::WriteError;
 use crate::stored::write_exact;
 use crate::volume::Volume;
 
-/// Voxels follow the header and four bytes that announce no extension.
+/// Voxels follow the header and the four bytes that declare no extension.
 const VOXELS_AT: f32 = 352.0;
 
 /// Writes a volume as NIfTI-1: `.nii`, or `.nii.gz` compressed.
 ///
-/// Whole numbers that fit are stored as int16, anything else as float32. The affine is stored in the sform, and in the qform too unless it is
-/// sheared; both hold it as f32. The file appears whole
-/// or not at all, and its bytes depend on the volume only.
+/// Integers that fit are stored as int16, anything else as float32. The affine is stored in the sform, and also in the qform unless it is
+/// sheared; both hold it as f32. The file is written completely
+/// or not at all, and its bytes depend only on the volume.
 ///
 /// # Errors
-/// [`WriteError`] for another extension, more than 32767 voxels along an axis, and a file system
-/// that refuses.
+/// [`WriteError`] for another extension, more than 32767 voxels along an axis, and failures of
+/// the file system.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
@@ -46,7 +46,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     }
     whole_file::write_with(path, |out| {
         if compress {
-            // CT noise hardly compresses: higher levels cost time and save a few percent.
+            // CT noise hardly compresses: higher levels take longer and save a few percent.
             let mut gzip = GzEncoder::new(out, Compression::fast());
             write_stream(&mut gzip, volume)?;
             gzip.finish().map(|_| ())
@@ -86,7 +86,7 @@ fn header(volume: &Volume) -> NiftiHeader {
     header
 }
 
-/// The fields that say something, little-endian at their places in `nifti1.h`; all others are 0.
+/// The non-zero fields, little-endian at their offsets in `nifti1.h`.
 fn header_bytes(header: &NiftiHeader) -> [u8; VOXELS_AT as usize] {
     let mut bytes = [0; VOXELS_AT as usize];
     let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);

@@ -6,7 +6,7 @@ use crate::error::ReadError;
 use crate::scan_file::{Packing, ScanFile};
 use crate::stored::{Number, Stored};
 
-/// Fields of the format that are understood, without their blanks.
+/// Supported fields of the format, without their blanks.
 const USED: &[&str] = &[
     "type",
     "dimension",
@@ -26,7 +26,7 @@ const USED: &[&str] = &[
     "kinds",
 ];
 
-/// Fields that change neither a voxel's value nor its place.
+/// Fields that change neither the value nor the position of a voxel.
 ///
 /// `centers` belongs here: `space origin` is the centre of the first sample in any case.
 const IRRELEVANT: &[&str] = &[
@@ -62,11 +62,11 @@ pub(super) struct Header {
     free_text: BTreeSet<&'static str>,
 }
 
-/// What lies before the voxels.
+/// What to skip before the voxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Skip {
     Bytes(u64),
-    /// Whatever the voxels at the end leave.
+    /// Everything before the voxels, which are at the end.
     AllButVoxels,
 }
 
@@ -100,7 +100,7 @@ impl Header {
         Err(file.header(format!("the header does not end within {MOST_LINES} lines")))
     }
 
-    /// One line. Messages leave its words out: they may be about a person.
+    /// Parses one line. Messages do not repeat its words: they may be about a person.
     fn take(&mut self, line: &str) -> Result<(), &'static str> {
         if let Some(comment) = line.strip_prefix('#') {
             if !COMMON_COMMENTS.contains(&comment.trim()) {
@@ -132,12 +132,12 @@ impl Header {
         }
     }
 
-    /// The value of a field, by its name without blanks.
+    /// Value of a field, by its name without blanks.
     pub(super) fn get(&self, name: &str) -> Option<&str> {
         self.fields.get(name).map(String::as_str)
     }
 
-    /// What the header holds in words of its writer's choice, by name.
+    /// Names of the fields with text chosen by the writer.
     pub(super) fn free_text(&self) -> BTreeSet<&'static str> {
         self.free_text.clone()
     }
@@ -210,7 +210,7 @@ impl Header {
         }
     }
 
-    /// The one file that holds the voxels, if this one does not.
+    /// Name of the single file with the voxels, if they are not in this one.
     pub(super) fn data_file(&self) -> Result<Option<&str>, String> {
         match self.get("datafile") {
             Some(list) if list == "LIST" || list.starts_with("LIST ") => {

@@ -1,13 +1,13 @@
-//! Where an NRRD header places the voxels.
+//! Position and orientation of the voxels from an NRRD header.
 
 use nalgebra::{Affine3, Matrix4, Vector3, Vector4};
 
 use super::header::Header;
 
-/// The place of a volume, as far as its header states it.
+/// Position and orientation of a volume, as far as its header states them.
 pub(super) struct Place {
     pub(super) ct_from_voxel: Affine3<f64>,
-    /// What the header leaves open.
+    /// Warning about what the header does not state.
     pub(super) doubt: Option<String>,
 }
 
@@ -66,7 +66,7 @@ fn no_orientation(lps_from_space: Vector4<f64>) -> String {
     )
 }
 
-/// Signs that turn the axes of the header's space into LPS; `None` for a space that is not the patient's.
+/// Signs that convert the axes of the header's space to LPS; `None` if no space is stated.
 fn axes_to_lps(header: &Header) -> Result<Option<Vector4<f64>>, String> {
     let Some(space) = header.get("space") else {
         return Ok(None);
@@ -84,7 +84,7 @@ fn axes_to_lps(header: &Header) -> Result<Option<Vector4<f64>>, String> {
     Ok(Some(Vector4::new(x, y, 1.0, 1.0)))
 }
 
-/// The axes i, j, k of bare spacings.
+/// Axes i, j, k from bare spacings.
 fn spacings(header: &Header) -> Result<Vec<Vector3<f64>>, String> {
     let text = header
         .get("spacings")
@@ -98,7 +98,7 @@ fn spacings(header: &Header) -> Result<Vec<Vector3<f64>>, String> {
     }
 }
 
-/// `count` vectors of three numbers: `(a,b,c) (d,e,f)`.
+/// Parses `count` vectors of three numbers: `(a,b,c) (d,e,f)`.
 fn vectors(text: &str, count: usize, field: &str) -> Result<Vec<Vector3<f64>>, String> {
     let wrong = || format!("{field} {text}, expected {count} x (number, number, number)");
     let mut found = Vec::new();
@@ -121,7 +121,7 @@ fn vectors(text: &str, count: usize, field: &str) -> Result<Vec<Vector3<f64>>, S
     }
 }
 
-/// Millimetres per unit of length; all three axes have the same.
+/// Millimetres per unit of length, which must be the same for all three axes.
 fn unit_mm(units: Option<&str>, field: &str) -> Result<f64, String> {
     let Some(units) = units else {
         return Ok(1.0);

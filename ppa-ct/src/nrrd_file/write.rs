@@ -13,12 +13,12 @@ use crate::volume::Volume;
 
 /// Writes a volume as `.nrrd`: one file, gzipped voxels, axes in LPS.
 ///
-/// Whole numbers that fit are stored as int16, anything else as float32. The affine, sheared or
-/// not, comes back exactly. The file appears whole or not at all, and its bytes depend on the
-/// volume only.
+/// Integers that fit are stored as int16, anything else as float32. The affine, sheared or
+/// not, is restored exactly on reading. The file is written completely or not at all, and its bytes
+/// depend only on the volume.
 ///
 /// # Errors
-/// [`WriteError`] for another extension and a file system that refuses.
+/// [`WriteError`] for another extension and failures of the file system.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     if !path
         .extension()
@@ -31,7 +31,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     }
     whole_file::write_with(path, |out| {
         out.write_all(header(volume).as_bytes())?;
-        // CT noise hardly compresses: higher levels cost time and save a few percent.
+        // CT noise hardly compresses: higher levels take longer and save a few percent.
         let mut gzip = GzEncoder::new(out, Compression::fast());
         write_exact(&mut gzip, volume.values())?;
         gzip.finish().map(|_| ())
@@ -49,7 +49,7 @@ fn header(volume: &Volume) -> String {
     } else {
         "float"
     };
-    // Rust prints the shortest decimals that come back as the same number.
+    // Rust prints the shortest decimals that parse to the same number.
     let affine = volume.grid().ct_from_voxel().matrix();
     let vector = |column: usize| {
         let [x, y, z] = [0, 1, 2].map(|row| affine[(row, column)]);

@@ -1,4 +1,4 @@
-//! The import audit on volumes whose oddities were put there.
+//! The import audit on volumes with known oddities.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use ppa_ct::audit::{Audit, FindingCode, Severity};
@@ -16,7 +16,7 @@ fn a_clean_leg_only_ends_where_the_scan_ends() {
     assert_eq!(audit.measures.axes, "LPS");
     assert!((audit.measures.air_peak_hu.unwrap() + 1000.0).abs() < 20.0);
     assert!((audit.measures.tissue_peak_hu.unwrap() - 45.0).abs() < 20.0);
-    // The cross-section: π 45² mm², but for the outline of 2 mm voxels.
+    // The cross-section: π 45² mm², apart from the outline of 2 mm voxels.
     assert!((audit.measures.cut_cm2.superior - 63.6).abs() < 3.0);
     assert!((audit.measures.bone_cm3 - 42.4).abs() < 3.0);
     let inside = Leg {
@@ -50,7 +50,7 @@ fn cut_faces_are_named_by_the_body_and_measured() {
         assert!((largest - 32.2).abs() < 2.0, "{areas:?}");
         assert_eq!(areas.iter().filter(|a| **a > 0.0).count(), 1);
     }
-    // The same voxels seen from another side: what was on the right is now on the left.
+    // The same voxels viewed from another side: what was on the right is now on the left.
     let turned = Leg {
         centre: [20.0, 70.0],
         direction: *Rotation3::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI).matrix(),
@@ -134,7 +134,7 @@ fn a_couch_is_found_where_it_is() {
     );
 }
 
-/// A copy of the chain at every column would take minutes here.
+/// Copying the chain at every column would take minutes here.
 #[test]
 fn the_couch_is_looked_for_in_time_that_grows_with_the_image() {
     let grid = Grid::axis_aligned(
@@ -309,7 +309,7 @@ fn identifiers_are_listed_by_name() {
     assert_eq!(reader, "gantry-tilt");
 }
 
-/// One voxel, one value, nothing but extremes: an answer, never a panic.
+/// One voxel, constant values, only extreme values: no panic.
 #[test]
 fn odd_volumes_are_audited() {
     for size in [[1, 1, 1], [1, 50, 1], [3, 1, 200], [64, 64, 1]] {

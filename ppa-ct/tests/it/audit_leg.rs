@@ -1,4 +1,4 @@
-//! A leg made on the spot, for the audit to look at.
+//! A synthetic leg for tests of the audit.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use ppa_ct::audit::{Audit, FindingCode};
@@ -41,7 +41,7 @@ impl Leg {
         let hu = (0..grid.len()).map(|n| {
             let [i, j, k] = grid.voxel(n);
             let (x, y, z) = (2.0 * i as f64, 2.0 * j as f64, self.slice_mm * k as f64);
-            // A fixed pattern in place of noise: −18..=18 HU.
+            // A fixed pattern instead of noise: −18..=18 HU.
             let noise = ((n * 7919) % 37) as f32 - 18.0;
             let r = (x - self.centre[0]).hypot(y - self.centre[1]);
             let inside = (self.length[0]..self.length[1]).contains(&z);

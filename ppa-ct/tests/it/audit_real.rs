@@ -7,8 +7,8 @@ use FindingCode::*;
 
 use crate::real::data;
 
-/// What a radiographer would say of each scan, no more and no less: the cut faces and the couch
-/// are those seen in its slices.
+/// Each scan gives exactly the findings that a radiographer would report: the cut faces and the couch
+/// are those visible in its slices.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn real_scans_are_judged_as_a_radiographer_would() {
@@ -74,7 +74,7 @@ fn real_scans_are_judged_as_a_radiographer_would() {
             "right, left, anterior, posterior",
             &[&CUT],
         ),
-        // Both arms reach the circle that was reconstructed.
+        // Both arms reach the edge of the reconstruction circle.
         (
             "abdomen-arms-j2k/dicom",
             "edge",

@@ -1,4 +1,4 @@
-//! DICOM files that broke on their way: an error or the right volume, never anything else.
+//! Damaged DICOM files give an error or the right volume, never anything else.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -63,7 +63,7 @@ fn a_file_cut_anywhere_is_an_error_or_whole() {
     }
 }
 
-/// The file with its first fragment of pixels cut, all lengths and delimiters around it right.
+/// The file with its first fragment of pixels truncated; all lengths and delimiters around it are correct.
 fn with_cut_fragment(bytes: &[u8], percent: usize) -> Option<Vec<u8>> {
     const ITEM: [u8; 4] = [0xfe, 0xff, 0, 0xe0];
     let pixels = bytes.windows(4).rposition(|w| w == [0xe0, 0x7f, 0x10, 0])?;
@@ -79,7 +79,7 @@ fn with_cut_fragment(bytes: &[u8], percent: usize) -> Option<Vec<u8>> {
     Some(cut)
 }
 
-/// What the container does not show, the decoders must.
+/// The decoders must detect damage that the container does not show.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn a_compressed_frame_cut_anywhere_is_an_error_or_whole() {
@@ -107,9 +107,9 @@ fn a_compressed_frame_cut_anywhere_is_an_error_or_whole() {
     assert_eq!(compressed, 13, "files with fragments");
 }
 
-/// Bytes changed, doubled and left out at random: no panic, and no memory beyond what files of this size may need.
+/// Bytes changed, duplicated and removed at random: no panic, and no memory beyond what files of this size may need.
 ///
-/// `PPA_FUZZ_SECONDS` makes it longer, `PPA_FUZZ_SEED` different.
+/// `PPA_FUZZ_SECONDS` makes it run longer, `PPA_FUZZ_SEED` selects other damage.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn damaged_files_do_not_panic() {
@@ -145,7 +145,7 @@ fn damaged_files_do_not_panic() {
 
 fn mutated(bytes: &[u8], rng: &mut TestRng) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
-    // Headers are where lengths and sizes are; half of the damage goes there.
+    // Lengths and sizes are in headers; half of the damage goes there.
     let header = bytes.windows(4).rposition(|w| w == [0xe0, 0x7f, 0x10, 0]);
     let header = header.map_or(bytes.len(), |at| at + 1024).min(bytes.len());
     for _ in 0..1 + rng.next_u32() % 4 {

@@ -1,4 +1,4 @@
-//! Damaged files: an error or the right volume, never a panic, never garbage.
+//! Damaged files give an error or the right volume, never a panic or wrong values.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::volumes::small;
 
 const NAMES: [&str; 5] = ["v.nii", "v.nii.gz", "v.nrrd", "v.mha", "v.mhd"];
 
-/// One way to spoil a file.
+/// One way to damage a file.
 #[derive(Debug, Clone)]
 enum Damage {
     Set(Index, u8),
@@ -23,7 +23,7 @@ enum Damage {
     Cut(Index),
     Remove(Index, Index),
     Repeat(Index, Index),
-    /// A word of a text header, or of another file, put somewhere.
+    /// A word of a text header, or of another file, inserted at a random position.
     Insert(Index, Vec<u8>),
 }
 
@@ -56,7 +56,7 @@ impl Damage {
 }
 
 fn damage() -> impl Strategy<Value = Damage> {
-    // Most of a format's weak places are in its first bytes.
+    // Most weak points of a format are in its first bytes.
     let place = || any::<Index>();
     let words: Vec<Vec<u8>> = [
         "-1",
@@ -99,14 +99,14 @@ fn damage() -> impl Strategy<Value = Damage> {
     ]
 }
 
-/// The file with the voxels of the `.mhd` in a folder.
+/// The data file of the `.mhd` in a folder.
 fn data_file(folder: &Path) -> PathBuf {
     let mut files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
     let is_zraw = |path: &PathBuf| path.extension().is_some_and(|e| e == "zraw");
     files.find(is_zraw).unwrap()
 }
 
-/// Puts damaged bytes in the place of a file's right ones and reads the scan; no more voxels than can have been
+/// Replaces a file's bytes by damaged ones and reads the scan; it must not have more voxels than fit
 /// in a file.
 fn read_damaged(
     header: &Path,
@@ -115,7 +115,7 @@ fn read_damaged(
     damage: &[Damage],
 ) -> Result<(), TestCaseError> {
     let mut bytes = right.to_vec();
-    // Half of the damage to the header, where it hurts most.
+    // Half of the damage goes to the header, where it has the most effect.
     let head = bytes.len().min(600);
     let tail = bytes.split_off(head);
     let (first, second) = damage.split_at(damage.len() / 2);
@@ -166,7 +166,7 @@ fn a_cut_file_is_an_error_at_every_length() {
             let bytes = fs::read(&cut).unwrap();
             for length in 0..bytes.len() {
                 fs::write(&cut, &bytes[..length]).unwrap();
-                // The last line feed of a header whose data lie elsewhere says nothing.
+                // The last line feed of a header with a separate data file is not needed.
                 let complete = cut == path && name == "v.mhd" && length + 1 == bytes.len();
                 assert_eq!(read(&path).is_ok(), complete, "{length} of {}", bytes.len());
             }
@@ -192,31 +192,31 @@ fn a_flipped_bit_in_packed_voxels_is_noticed() {
             &[0x78, 0x01]
         };
         let start = bytes.windows(2).position(|w| w == magic).unwrap();
-        // The gzip header holds a time and the like in ten bytes, zlib's flags are checked.
+        // Ten bytes of the gzip header are not checked, such as the time; zlib's flags are.
         let first = start + if name == "v.nrrd" { 10 } else { 0 };
         for at in first..bytes.len() {
             let mut damaged = bytes.clone();
             damaged[at] ^= 0x10;
             fs::write(&file, damaged).unwrap();
-            // A copy from another place may still decode to the same bytes.
+            // A copy from another position may still decode to the same bytes.
             let harmless = |scan: ppa_ct::Scan| scan.volume == small();
             assert!(read(&path).map_or(true, harmless), "{name}: byte {at}");
         }
     }
 }
 
-/// A header file of the shared data, the file that holds its voxels, and what they make up.
+/// A header file of the shared data, its data file, and the volume they give.
 struct Sample {
     header: PathBuf,
     voxels: PathBuf,
     volume: Volume,
 }
 
-/// The shared files of one reader, copied to where they can be spoiled.
+/// The shared files of one reader, copied to a folder where they can be damaged.
 fn samples(folder: &Path, names: &[&str]) -> Vec<Sample> {
     let copy = |name: &str| {
         let to = folder.join(Path::new(name).file_name().unwrap());
-        // Not `fs::copy`: the copy is to be written to.
+        // Not `fs::copy`: the copy must be writable.
         fs::write(&to, fs::read(data(name)).unwrap()).unwrap();
         to
     };
@@ -255,7 +255,7 @@ const META_IMAGE: &[&str] = &[
     "lung-mha/3DCT_lung_baseline_small.mha",
 ];
 
-/// Header and data file cut at each percent of their length.
+/// Header and data file truncated at each percent of their length.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn real_files_cut_at_each_percent_are_errors_or_right() {
@@ -278,7 +278,7 @@ fn real_files_cut_at_each_percent_are_errors_or_right() {
     }
 }
 
-/// Spoils shared files for a second; `PPA_FUZZ_SECONDS` makes it longer, `PPA_FUZZ_SEED` different.
+/// Damages shared files for a second; `PPA_FUZZ_SECONDS` makes it run longer, `PPA_FUZZ_SEED` selects other damage.
 fn spoil_for_a_while(names: &[&str]) {
     let setting = |name: &str| std::env::var(name).map_or(1, |v| v.parse::<u64>().unwrap());
     let end = Instant::now() + Duration::from_secs(setting("PPA_FUZZ_SECONDS"));

@@ -1,4 +1,4 @@
-//! DICOM series made on the spot: geometry, values, refusals.
+//! Synthetic DICOM series: geometry, values, refusals.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ fn codes(path: &Path) -> Vec<WarningCode> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Each voxel lies where its slice put it, whatever the orientation, tilt and file order.
+    /// Each voxel is where its slice put it, whatever the orientation, tilt and file order.
     #[test]
     fn voxels_lie_where_their_slices_say(
         angles in prop::array::uniform3(-3.0..3.0_f64),
@@ -89,7 +89,7 @@ fn stored_bits_and_rescale_are_applied_per_slice() {
     }
 }
 
-/// Whole numbers take 16 bits as long as all of them fit; where one slice does not, no value is lost.
+/// Integers take 16 bits as long as all of them fit; if one slice does not, no value is lost.
 #[test]
 fn values_are_kept_in_16_bits_where_these_hold_them() {
     for (rescale, whole) in [
@@ -301,7 +301,7 @@ fn a_cut_file_is_an_error_at_every_length() {
     }
 }
 
-/// Facts pass on; of identifying attributes the names alone.
+/// Facts are kept; of identifying attributes only the names.
 #[test]
 fn the_acquisition_is_reported_without_a_value_that_identifies() {
     let folder = tempfile::tempdir().unwrap();

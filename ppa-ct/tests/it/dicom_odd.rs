@@ -1,4 +1,4 @@
-//! DICOM files that are odd, in what they hold or in what lies beside them: read right or refused with the reason.
+//! Unusual DICOM files and folders are read correctly or refused with the reason.
 
 use std::fs;
 use std::path::Path;
@@ -27,7 +27,7 @@ fn chosen(folder: &Path, series: &str) -> Result<Scan, ReadError> {
     read_with(folder, &options)
 }
 
-/// Dose sheets and other pages call themselves CT.
+/// Dose sheets and other pages have the modality CT.
 #[test]
 fn an_image_that_is_no_slice_refuses_its_own_series_only() {
     type Odd = fn(&mut InMemDicomObject);
@@ -79,7 +79,7 @@ fn an_image_that_is_no_slice_refuses_its_own_series_only() {
             "{error}"
         );
 
-        // Among the slices of a series it may be one that is missing then.
+        // Among the slices of a series, it may be one whose absence leaves a gap.
         slices[1].change = change;
         write_series(folder, &slices);
         let error = chosen(folder, "3").unwrap_err().to_string();
@@ -134,7 +134,7 @@ fn units_are_read_as_they_are_spelt() {
     assert_eq!(unit(unknown), (false, Some("another unit")));
 }
 
-/// Two frames of nine pixels: the middle word holds the last of one and the first of the other.
+/// Two frames of nine pixels: the middle word contains the last pixel of one and the first of the other.
 #[test]
 fn odd_frames_in_big_endian_words_are_separated() {
     let folder = tempfile::tempdir().unwrap();
@@ -190,7 +190,7 @@ fn odd_frames_in_big_endian_words_are_separated() {
     assert_eq!(*volume.hu(), (0..18).map(|n| n as f32).collect::<Vec<_>>());
 }
 
-/// Parsed for each frame and attribute, this would take minutes.
+/// If parsed for each frame and attribute, this would take minutes.
 #[test]
 fn groups_that_all_frames_share_are_parsed_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -274,7 +274,7 @@ fn write_jpeg_ls(path: &Path, slice: &SliceSpec, stream: &[u8]) {
     fs::write(path, bytes).unwrap();
 }
 
-/// Equal lines take a bit each; what claims to be larger still is refused before there is memory for it.
+/// Repeated lines take a bit each; a larger claimed size is refused before memory is reserved for it.
 #[test]
 fn blank_slices_are_read_however_well_they_pack() {
     let folder = tempfile::tempdir().unwrap();
@@ -283,7 +283,7 @@ fn blank_slices_are_read_however_well_they_pack() {
         let [high, low] = side.to_be_bytes();
         let frame = [0xff, 0xf7, 0, 11, 16, high, low, high, low, 1, 1, 0x11, 0];
         let scan = [0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0];
-        // Ones only, which say that runs continue; behind 0xff a zero is stuffed in.
+        // Only ones, which continue runs; after 0xff a zero is stuffed.
         let ones = [0xff, 0x7f].repeat(usize::from(side) / 15 + 5);
         let stream = [&[0xff, 0xd8], &frame[..], &scan, &ones, &[0xff, 0xd9]].concat();
         let slice = SliceSpec {
@@ -306,7 +306,7 @@ fn blank_slices_are_read_however_well_they_pack() {
     assert!(matches!(bomb, ReadError::PixelCount { .. }), "{bomb}");
 }
 
-/// Seen in public test images: an application title of 18 characters, where 16 are allowed.
+/// Found in public test images: an application title of 18 characters, where 16 are allowed.
 #[test]
 fn a_mistake_in_the_meta_group_does_not_stop_the_reading() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! DICOM slices written, read again, and looked at element by element.
+//! DICOM slices written, read back, and checked element by element.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 use crate::volumes::{small, volumes};
 
-/// The volume with its slices from the other end, at the same places.
+/// The volume with its slices in reverse order, at the same positions.
 fn reversed(volume: &Volume) -> Volume {
     let [nx, ny, nz] = volume.grid().size();
     let mut matrix = *volume.grid().ct_from_voxel().matrix();
@@ -27,10 +27,10 @@ fn reversed(volume: &Volume) -> Volume {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whole values come back equal, others within half a level; places within a nanometre.
+    /// Integers come back equal, other values within half a level; positions within a nanometre.
     #[test]
     fn what_is_written_comes_back(volume in volumes(), tilt in -0.4..0.4_f64) {
-        // Leaning slices are a gantry tilt, leaning rows are none.
+        // Leaning slices are a gantry tilt, leaning rows are not.
         let mut matrix = *volume.grid().ct_from_voxel().matrix();
         let [i, j, k] = [0, 1, 2].map(|axis| matrix.fixed_view::<3, 1>(0, axis).into_owned());
         let upright = j - i * (i.dot(&j) / i.norm_squared());
@@ -60,7 +60,7 @@ proptest! {
         }
         let size = upright.grid().size();
         prop_assert_eq!(back.volume.grid().size(), size);
-        // A single slice says nothing about a step that leans.
+        // A single slice does not determine the direction of the step.
         let corners = if slices > 1 { size } else { [size[0], size[1], 1] };
         for corner in 0..8 {
             let voxel = [0, 1, 2].map(|axis| (corner >> axis & 1) as f64 * (corners[axis] - 1) as f64);
@@ -149,7 +149,7 @@ fn tilt_and_single_slices_survive() {
     assert_eq!(read(&folder).unwrap().volume, single);
 }
 
-/// What may be read may be written: direction cosines rounded to three digits.
+/// What can be read can also be written: direction cosines rounded to three digits.
 #[test]
 fn axes_nearly_at_right_angles_survive() {
     let parent = tempfile::tempdir().unwrap();
@@ -182,7 +182,7 @@ fn a_failed_write_leaves_nothing() {
     assert!(matches!(refused, Err(WriteError::Io { .. })));
     assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 0);
 
-    // An empty folder is taken, one with anything in it is left alone.
+    // An empty folder is used, one with anything in it is never touched.
     let empty = parent.path().join("empty");
     fs::create_dir(&empty).unwrap();
     write_dicom(&empty, &small()).unwrap();

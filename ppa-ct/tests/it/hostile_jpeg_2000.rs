@@ -1,4 +1,4 @@
-//! JPEG 2000 streams of some bytes whose headers ask for gigabytes.
+//! Short JPEG 2000 streams whose headers ask for gigabytes.
 
 use dicom_core::value::PixelFragmentSequence;
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR};
@@ -7,7 +7,7 @@ use ppa_ct::{ReadError, Scan, read};
 
 use crate::series::SliceSpec;
 
-/// What a stream of one component with 8 bits says in its headers.
+/// Header fields of a stream of one component with 8 bits.
 #[derive(Clone, Copy)]
 struct Stream {
     size: u32,
@@ -15,7 +15,7 @@ struct Stream {
     step: u8,
     layers: u16,
     levels: u8,
-    /// Exponents of a code-block's sides, less 2.
+    /// Exponents of a code-block's sides, minus 2.
     block: u8,
     /// Exponents of all precincts' sides.
     precinct: Option<u8>,
@@ -50,7 +50,7 @@ impl Stream {
         segment(0x52, &[&start[..], &precincts].concat())
     }
 
-    /// The stream with one empty packet, padded by comments to a length.
+    /// The stream with one empty packet, padded by comments to the given length.
     fn bytes(&self, length: usize) -> Vec<u8> {
         let (size, tile) = (self.size, self.tile);
         let sizes = [size, size, 0, 0, tile, tile, 0, 0].map(u32::to_be_bytes);
@@ -129,7 +129,7 @@ fn an_empty_packet_is_a_grey_image() {
         precinct: Some(4),
         ..PLAIN
     };
-    // Tiles and packets that are missing are grey as well.
+    // Missing tiles and packets are grey as well.
     assert!(levels.read(0).is_ok());
 }
 
@@ -211,7 +211,7 @@ fn what_headers_ask_for_is_bounded() {
     assert!(allowed.read(0).is_ok());
 }
 
-/// Most memory that this process has held so far.
+/// Peak memory of this process so far.
 #[cfg(target_os = "linux")]
 fn peak_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
@@ -222,7 +222,7 @@ fn peak_kib() -> u64 {
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-/// The decoder takes some segments by their length and others by their contents.
+/// The decoder skips some segments by length and others by content.
 #[test]
 fn segments_of_wrong_length_are_refused() {
     let right = PLAIN.bytes(0);

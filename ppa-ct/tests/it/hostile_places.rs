@@ -1,4 +1,4 @@
-//! Files that lead elsewhere: links beside headers, and directories of a medium.
+//! Files that point elsewhere: links next to headers, and directories of a medium.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::series::{SliceSpec, write_series};
 use crate::text_headers::voxels;
 use crate::volumes::small;
 
-/// What is named in a header may be anybody's file.
+/// A header may name anybody's file.
 #[cfg(unix)]
 #[test]
 fn a_link_beside_a_header_does_not_lead_out_of_its_folder() {
@@ -58,7 +58,7 @@ fn slice(z: f64) -> SliceSpec {
     SliceSpec::axial([4, 3], z, |i, j| (10 * j + i) as i16 - 1000)
 }
 
-/// A DICOMDIR that names files.
+/// Writes a DICOMDIR that lists files.
 fn write_directory(path: &Path, ids: &[&str]) {
     let records = ids.iter().map(|id| {
         let id = PrimitiveValue::from(*id);
@@ -99,7 +99,7 @@ fn a_directory_of_the_medium_leads_to_its_files() {
         assert_eq!(scan.volume, alone.volume, "{}", path.display());
         assert_eq!(scan.warnings[0].code, WarningCode::NonImagesDropped);
     }
-    // An image beside the directory hides none of its files.
+    // An image next to the directory hides none of its files.
     slice(3.0).write(&folder.path().join("IMAGE"));
     assert_eq!(read(folder.path()).unwrap().volume.grid().size(), [4, 3, 4]);
     fs::remove_file(folder.path().join("IMAGE")).unwrap();

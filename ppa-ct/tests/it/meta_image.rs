@@ -1,4 +1,4 @@
-//! MetaImage: the ways to say the same, and what is refused.
+//! MetaImage: equivalent headers, and what is refused.
 
 use std::fs;
 use std::io::Write;
@@ -11,7 +11,7 @@ use ppa_ct::{ReadError, ReadOptions, Scan, WarningCode, read, read_with};
 use crate::text_headers::{assert_all_small, changed, gzipped, voxels};
 use crate::volumes::small;
 
-/// The header of [`small`] as lines; `ElementDataFile` comes behind.
+/// The header of [`small`] as lines; `ElementDataFile` follows.
 const LINES: &[&str] = &[
     "ObjectType = Image",
     "NDims = 3",
@@ -72,7 +72,7 @@ fn raw_packed_local_and_beside_are_one() {
             "v 1.raw",
             &[b"any", &voxels()[..]].concat(),
         ),
-        // Other names for the same, and what the format lets be left out.
+        // Other names of the same keys, and optional keys left out.
         local(
             &["TransformMatrix =", "Rotation = 1 0 0 0 1 0 0 0 1"],
             &voxels(),
@@ -94,7 +94,7 @@ fn raw_packed_local_and_beside_are_one() {
     ]);
 }
 
-/// Whatever of the voxels the buffer holds when their packing is looked at.
+/// Whatever part of the voxels the buffer holds when their packing is detected.
 #[test]
 fn packed_voxels_are_known_wherever_the_header_ends() {
     let gzip = gzipped(&voxels());
@@ -136,7 +136,7 @@ fn byte_orders_types_and_intensities_are_honoured() {
     assert_eq!(volume(local(&intensity, &stored)).hu()[3], -998.5);
 }
 
-/// The first three numbers are where i runs, the next where j runs.
+/// The first three numbers are the direction of i, the next three that of j.
 #[test]
 fn the_matrix_lists_the_axes_one_after_the_other() {
     let scan = local(&["TransformMatrix = 0 0 1 1 0 0 0 -1 0"], &voxels()).unwrap();

@@ -1,4 +1,4 @@
-//! MetaImage written: what comes back, and what takes whose place.
+//! Writing MetaImage: what is read back, and which files are replaced.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::text_headers::voxels;
 use crate::volumes::{max_abs, small, volumes};
 
 proptest! {
-    /// Values come back equal, places up to the rounding of spacing x direction.
+    /// Values come back equal, positions up to the rounding of spacing x direction.
     #[test]
     fn what_is_written_comes_back(volume in volumes(), detached in any::<bool>()) {
         let folder = tempfile::tempdir()?;
@@ -33,13 +33,13 @@ fn a_failed_write_leaves_nothing() {
     assert!(matches!(write("v.nii"), Err(WriteError::Extension { .. })));
     assert!(matches!(write("missing/v.mha"), Err(WriteError::Io { .. })));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-    // The voxels are written when the header turns out to be impossible.
+    // The voxels are already written when writing the header fails.
     fs::create_dir(folder.path().join("v.mhd")).unwrap();
     assert!(matches!(write("v.mhd"), Err(WriteError::Io { .. })));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// Until the header is replaced the old pair is there to be read, afterwards no file of it is left.
+/// Until the header is replaced the old pair stays readable; afterwards no file of it is left.
 #[test]
 fn a_pair_is_replaced_by_its_header() {
     let folder = tempfile::tempdir().unwrap();
@@ -60,14 +60,14 @@ fn a_pair_is_replaced_by_its_header() {
     assert_eq!([old.len(), new.len()], [2, 2]);
     assert_eq!(read(&path).unwrap().volume, other);
 
-    // A crash between the two files: the new data file beside the old pair.
+    // A crash between the two files: the new data file next to the old pair.
     let new_data = fs::read(folder.path().join(&new[0])).unwrap();
     write_meta_image(&path, &small()).unwrap();
     fs::write(folder.path().join(&new[0]), new_data).unwrap();
     assert_eq!(fs::read(&path).unwrap(), old_header);
     assert_eq!(read(&path).unwrap().volume, small());
 
-    // A data file that another program wrote may belong to others too.
+    // A data file written by another program may be shared by other headers.
     fs::write(folder.path().join("v.raw"), voxels()).unwrap();
     fs::write(&path, header(&[], "v.raw")).unwrap();
     write_meta_image(&path, &small()).unwrap();
@@ -88,7 +88,7 @@ fn names_come_back_or_are_refused() {
         let refused = write_meta_image(&path.with_added_extension("mhd"), &small());
         assert!(matches!(refused, Err(WriteError::Name { .. })), "{name}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-        // A single file needs no name in its header.
+        // A single file does not need a name in its header.
         let single = path.with_added_extension("mha");
         write_meta_image(&single, &small()).unwrap();
         assert_eq!(read(&single).unwrap().volume, small(), "{name}");

@@ -20,7 +20,7 @@ proptest! {
         prop_assert!(max_abs(a.matrix(), b.matrix()) < 6.2e-5);
         prop_assert_eq!(std::fs::read_dir(folder.path())?.count(), 1, "temporary files left");
 
-        // With the sform switched off, the qform alone must say the same, unless it is sheared.
+        // With the sform switched off, the qform alone must give the same, unless the volume is sheared.
         if !compress {
             let mut bytes = std::fs::read(&path)?;
             bytes[254..256].fill(0);
@@ -153,12 +153,12 @@ fn a_flipped_bit_never_changes_the_volume_unnoticed() {
     let path = folder.path().join("v.nii.gz");
     write_nifti(&path, &small()).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    // Behind the ten bytes of the gzip header, which hold a time and the like.
+    // After the ten bytes of the gzip header, which contain a time and other unchecked fields.
     for at in 10..bytes.len() {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x10;
         std::fs::write(&path, damaged).unwrap();
-        // A copy from another place may still decode to the same bytes.
+        // A copy from another position may still decode to the same bytes.
         let harmless = |scan: ppa_ct::Scan| scan.volume == small();
         assert!(read(&path).map_or(true, harmless), "byte {at}");
     }
@@ -170,7 +170,7 @@ fn free_text_is_reported_by_name() {
     assert!(names(patched(&[]).unwrap()).is_empty());
     assert_eq!(names(patched(&[(148, b"Doe")]).unwrap()), ["descrip"]);
 
-    // An extension of 16 bytes, a comment, in front of voxels that begin behind it.
+    // A 16-byte extension, a comment, before voxels that begin after it.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("v.nii");
     write_nifti(&path, &small()).unwrap();
@@ -198,7 +198,7 @@ fn a_failed_write_leaves_nothing() {
         write_nifti(&nowhere, &small()),
         Err(WriteError::Io { .. })
     ));
-    // The rename onto a folder fails when all bytes are already written.
+    // Renaming onto a folder fails when all bytes are already written.
     let taken = folder.path().join("v.nii");
     std::fs::create_dir(&taken).unwrap();
     assert!(write_nifti(&taken, &small()).is_err());
@@ -206,7 +206,7 @@ fn a_failed_write_leaves_nothing() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// `scl_slope` at byte 112, `scl_inter` at 116: values of the format's authors, and of programs in use.
+/// `scl_slope` at byte 112, `scl_inter` at 116: values from the format's authors and from common programs.
 #[test]
 fn invalid_scalings_are_refused() {
     let scaled = |slope: f32, intercept: f32| {

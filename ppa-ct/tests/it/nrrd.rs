@@ -1,4 +1,4 @@
-//! NRRD: the ways to say the same, and what is refused.
+//! NRRD: equivalent headers, and what is refused.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::text_headers::{assert_all_small, changed, gzipped, voxels};
 use crate::volumes::{max_abs, small, volumes};
 
 proptest! {
-    /// Values and places come back equal to the last bit.
+    /// Values and positions come back equal to the last bit.
     #[test]
     fn what_is_written_comes_back(volume in volumes()) {
         let folder = tempfile::tempdir()?;
@@ -42,7 +42,7 @@ pub fn header(changes: &[&str]) -> String {
     changed(LINES, changes, &[':'])
 }
 
-/// Reads a file of this header and these bytes.
+/// Reads a file with this header and these bytes.
 pub fn attached(changes: &[&str], data: &[u8]) -> Result<Scan, ReadError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("v.nrrd");
@@ -50,7 +50,7 @@ pub fn attached(changes: &[&str], data: &[u8]) -> Result<Scan, ReadError> {
     read(&path)
 }
 
-/// Reads this header with these bytes in `v.raw` beside it.
+/// Reads this header with these bytes in `v.raw` next to it.
 pub fn detached(changes: &[&str], data: &[u8]) -> Result<Scan, ReadError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("v.nhdr");
@@ -83,7 +83,7 @@ fn raw_packed_attached_and_detached_are_one() {
             &[file, "byte skip: -1"],
             &[b"any length", &voxels()[..]].concat(),
         ),
-        // Lines of the file, bytes of what it unpacks to.
+        // Lines of the file, bytes of its unpacked contents.
         detached(
             &[file, "encoding: gzip", "lineskip: 1", "byte skip: 3"],
             &[b"a\n", &gzipped(&[b"???", &voxels()[..]].concat())[..]].concat(),
@@ -109,12 +109,12 @@ fn byte_orders_and_types_are_honoured() {
     let doubles = (-1000..-988_i16).flat_map(|v| f64::from(v).to_le_bytes());
     let doubles = doubles.collect::<Vec<_>>();
     assert_eq!(volume(attached(&["type: double"], &doubles)), small());
-    // One byte has no order.
+    // A single byte has no byte order.
     let scan = attached(&["type: uchar", "endian:"], &[7; 12]).unwrap();
     assert_eq!(scan.volume.values(), Values::I16(&[7; 12]));
 }
 
-/// The same place said in three spaces and in micrometres.
+/// The same position stated in three spaces and in micrometres.
 #[test]
 fn spaces_and_units_lead_to_one_lps() {
     for (space, signs) in [

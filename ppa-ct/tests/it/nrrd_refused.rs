@@ -1,4 +1,4 @@
-//! NRRD that is refused, and what the refusal says.
+//! NRRD files that are refused, and the messages.
 
 use std::fs;
 
@@ -85,7 +85,7 @@ fn a_data_file_cut_anywhere_is_refused() {
     }
 }
 
-/// A header may hold anything about a person; messages repeat none of it.
+/// A header may contain personal information; messages repeat none of it.
 #[test]
 fn a_line_that_is_not_understood_is_not_repeated() {
     for line in ["Doe John", "Doe John: 1950", "key without end"] {
@@ -110,7 +110,7 @@ fn too_few_and_too_many_bytes_are_refused() {
             assert!(counted, "{error}");
         }
     }
-    // A size that no file can hold is refused before memory is asked for.
+    // A size that no file can hold is refused before memory is reserved.
     let error = attached(&["sizes: 3 2 4294967296000"], &voxels()).unwrap_err();
     assert!(
         matches!(error, ReadError::PixelCount { found: 24, .. }),

@@ -1,4 +1,4 @@
-//! Real scans from the folder beside the repository.
+//! Real scans from the folder next to the repository.
 
 use std::path::{Path, PathBuf};
 
@@ -124,7 +124,7 @@ fn one_hand_in_many_containers_is_one_hand() {
     }
 }
 
-/// MetaImage as ITK writes it: size, spacing, origin and range as documented with the data.
+/// MetaImage as ITK writes it: size, spacing, origin and range match the documentation of the data.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn a_lung_written_by_others_reads_as_documented() {
@@ -137,7 +137,7 @@ fn a_lung_written_by_others_reads_as_documented() {
     assert_eq!(codes(&scan), []);
 }
 
-/// Another memory order, and a rigid motion: voxels are found again at their world positions.
+/// Another memory order and a rigid motion: voxels are found again at their world positions.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn permuted_and_oblique_axes_keep_the_world() {
@@ -175,7 +175,7 @@ fn a_picture_is_not_taken_for_hounsfield_units() {
     assert_eq!(Info::of(&metal).hu_max, 3382.0);
 }
 
-/// Whatever lies in the data folder, whole or cut short: an answer, never a panic.
+/// Any file of the data folder, complete or truncated: no panic.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn nothing_panics() {
@@ -198,7 +198,7 @@ fn nothing_panics() {
         let siblings = path
             .parent()
             .map_or(0, |p| std::fs::read_dir(p).unwrap().count());
-        // Of a long series, a few files are enough.
+        // A few files of a long series are enough.
         if path.is_file() && siblings > 40 && n % 23 != 0 {
             continue;
         }

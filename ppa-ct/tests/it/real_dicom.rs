@@ -46,7 +46,7 @@ fn what_must_be_refused_is_refused() {
     let ReadError::UnevenSteps { gaps, .. } = &error else {
         panic!("{error}");
     };
-    // Slices 11, 12 and 30 are gone: the steps behind slices 10 and 29 (27 of those left).
+    // Slices 11, 12 and 30 are missing: the steps after slices 10 and 29 (27 of those left).
     assert_eq!(
         gaps.iter().map(|g| g.after_slice).collect::<Vec<_>>(),
         [10, 27]
@@ -165,7 +165,7 @@ fn every_encoding_of_one_slice_is_read_or_refused_by_name() {
         let values = [&scan, &reference].map(|s| s.volume.values().iter());
         let [found, expected] = values;
         let differences = found.zip(expected);
-        // Padding outside the bore is not kept by the lossy ones.
+        // Lossy encodings do not keep the padding outside the bore.
         let inside = differences.filter(|(_, b)| *b >= -1024.0);
         let worst = inside.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(f64::from(worst) <= worst_hu + stored_hu, "{name}: {worst}");

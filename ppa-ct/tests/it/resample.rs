@@ -1,4 +1,4 @@
-//! Volumes on other lattices, against fields whose values are known everywhere.
+//! Volumes on other lattices, compared with fields whose values are known everywhere.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ fn upright_grid(size: [usize; 3], spacing_mm: [f64; 3]) -> Grid {
     .unwrap()
 }
 
-/// A turned lattice whose k axis leans.
+/// A rotated lattice whose k axis leans.
 fn sheared_grid(size: [usize; 3], angles: [f64; 3], lean: [f64; 2]) -> Grid {
     let turn = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]);
     let shear = Matrix3::new(1.0, 0.0, lean[0], 0.0, 1.2, lean[1], 0.0, 0.0, 2.0);
@@ -32,7 +32,7 @@ fn sheared_grid(size: [usize; 3], angles: [f64; 3], lean: [f64; 2]) -> Grid {
     Grid::new(size, Affine3::from_matrix_unchecked(matrix)).unwrap()
 }
 
-/// Worst difference from a field at the voxels at least `margin_mm` inside the box of `within`.
+/// Largest difference from a field at the voxels at least `margin_mm` inside the box of `within`.
 fn worst(volume: &Volume, within: &Grid, margin: f64, field: impl Fn(&Point3<f64>) -> f64) -> f64 {
     let grid = volume.grid();
     let here_from_ct = within.voxel_from_ct();
@@ -93,20 +93,20 @@ proptest! {
         let grid = upright_grid([9, 9, 9], [1.1, 0.9, 1.3]);
         let fine = sampled(&grid, field).resampled(Vector3::from(spacing), Cubic).unwrap();
         prop_assert!(worst(&fine, &grid, 1.0, field) < 1e-3);
-        // The check can fail: linear interpolation bends quadratics.
+        // The check can fail: linear interpolation is not exact for quadratics.
         prop_assume!(c[0].abs() > 0.5);
         let linear = sampled(&grid, field).resampled(Vector3::from(spacing), Linear).unwrap();
         prop_assert!(worst(&linear, &grid, 1.0, field) > 1e-3);
     }
 
-    /// A coarse volume holds the same tissue: blocks of `factor` voxels, each with the mean around it.
+    /// A coarse volume contains the same tissue: blocks of `factor` voxels, each with the mean around it.
     #[test]
     fn coarsening_keeps_the_mean(
         values in prop::collection::vec(-1000.0..1500.0_f32, 12 * 12 * 12),
         factor in 2..4_usize,
         how in prop::sample::select(vec![Linear, Cubic]),
     ) {
-        // Noise only in the middle, so that nothing is cut by the faces.
+        // Noise only in the middle, so that the faces cut none of it.
         let grid = upright_grid([36; 3], [0.5, 0.7, 0.9]);
         let mut hu = vec![0.0; grid.len()];
         for (n, value) in values.iter().enumerate() {
@@ -122,7 +122,7 @@ proptest! {
         prop_assert!((mean(&coarse) - mean(&fine)).abs() < 0.5, "{} {}", mean(&coarse), mean(&fine));
     }
 
-    /// Axes in any order and direction are only another order of the same voxels.
+    /// Axes in any order and direction only reorder the same voxels.
     #[test]
     fn permuted_and_turned_axes_permute_the_voxels(
         order in Just([0, 1, 2]).prop_shuffle(),
@@ -146,14 +146,14 @@ proptest! {
             let voxel = [0, 1, 2].map(|axis| place[axis].round() as usize);
             prop_assert!((found.hu()[n] - volume.at(voxel)).abs() < 1e-3);
         }
-        // Its axes are reported as the body's directions.
+        // Its axes are reported in the order of the body directions.
         for (direction, (axis, against)) in other.lps_axes().into_iter().enumerate() {
             prop_assert_eq!((order[axis], against), (direction, turned[direction]));
         }
     }
 }
 
-/// Amplitude of a wave along x once the volume has voxels three times as long.
+/// Amplitude of a wave along x after resampling to voxels three times as long.
 fn amplitude_after_coarsening(cycles_per_voxel: f64, how: Interpolation) -> f64 {
     let grid = upright_grid([240, 3, 3], [1.0; 3]);
     let wave = |p: &Point3<f64>| 1000.0 * (TAU * cycles_per_voxel * (p.x + 7.0) + 0.4).sin();
@@ -212,7 +212,7 @@ fn a_tilted_stack_becomes_upright() {
     assert_eq!(square.upright(Linear, 0.0).unwrap(), square);
 }
 
-/// Slices that lie whole voxels apart are only moved: each value arrives as it was.
+/// Slices that are whole voxels apart are only moved: each value is unchanged.
 #[test]
 fn an_upright_stack_is_as_sharp_as_the_tilted_one() {
     let mut matrix = Matrix4::from_diagonal(&nalgebra::Vector4::new(0.5, 0.5, 2.0, 1.0));
@@ -286,13 +286,13 @@ fn spacings_that_are_none_are_refused() {
             Err(VolumeError::TooCoarse { side_mm: 4.0, .. })
         ));
     }
-    // A spacing somewhat longer than the volume leaves one voxel in its middle.
+    // A spacing somewhat longer than the volume leaves one voxel at its centre.
     let one = volume.resampled(Vector3::repeat(7.9), Linear).unwrap();
     assert_eq!(one.grid().size(), [1; 3]);
     assert!((one.grid().origin_mm() - volume.grid().centre([1.5; 3])).norm() < 1e-9);
 }
 
-/// A low-pass as wide as the volume leaves its mean, however wide.
+/// A low-pass as wide as the volume preserves its mean, however wide.
 #[test]
 fn a_lattice_coarser_than_the_volume_sees_its_mean() {
     let grid = upright_grid([4000, 2, 1], [0.5, 1.0, 1.0]);

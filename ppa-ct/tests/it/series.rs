@@ -1,4 +1,4 @@
-//! Makes DICOM series whose every voxel and position is known.
+//! Synthetic DICOM series with known voxels and positions.
 
 use std::path::Path;
 
@@ -16,9 +16,9 @@ pub struct SliceSpec {
     pub position: Point3<f64>,
     pub along_row: Vector3<f64>,
     pub down_column: Vector3<f64>,
-    /// Between columns (along i), between rows (along j).
+    /// Distance between columns (along i), then between rows (along j).
     pub spacing_mm: [f64; 2],
-    /// Stored values, columns fastest; the bit pattern of signed ones.
+    /// Stored values, columns fastest; signed ones as bit patterns.
     pub stored: Vec<u16>,
     pub signed: bool,
     pub bits_stored: u16,
@@ -27,7 +27,7 @@ pub struct SliceSpec {
     pub modality: &'static str,
     pub image_type: &'static str,
     pub syntax: &'static str,
-    /// What is odd about it: made to the data set last.
+    /// Last change to the data set, which makes it unusual.
     pub change: fn(&mut InMemDicomObject),
 }
 
@@ -59,7 +59,7 @@ impl SliceSpec {
         self.write_changed(path, self.change);
     }
 
-    /// Writes it with a change of the data set that is made last.
+    /// Writes the slice with a last change to the data set.
     pub fn write_changed(&self, path: &Path, change: impl FnOnce(&mut InMemDicomObject)) {
         let decimal = |values: &[f64]| {
             let texts = values.iter().map(|v| format!("{v:.10}"));
@@ -136,7 +136,7 @@ impl SliceSpec {
             object.clone().with_meta(meta).expect("a valid meta group")
         };
         if self.syntax == uids::DEFLATED_EXPLICIT_VR_LITTLE_ENDIAN {
-            // dicom-object needs a feature for this, which the program is built without.
+            // dicom-object needs a feature for this, which the program does not enable.
             let mut bytes = [&[0; 128][..], b"DICM"].concat();
             file(self.syntax).meta().write(&mut bytes).unwrap();
             let mut encoder = DeflateEncoder::new(&mut bytes, Compression::fast());
@@ -151,7 +151,7 @@ impl SliceSpec {
     }
 }
 
-/// Writes slices into `folder` under names that say nothing about their order.
+/// Writes slices into `folder` under names unrelated to their order.
 pub fn write_series(folder: &Path, slices: &[SliceSpec]) {
     for (n, slice) in slices.iter().enumerate() {
         let scrambled = (n * 7919 + 13) % 10007;

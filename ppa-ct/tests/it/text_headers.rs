@@ -1,4 +1,4 @@
-//! What the tests of MetaImage and NRRD share: headers of lines, and the voxels of [`small`].
+//! Shared by the tests of MetaImage and NRRD: headers of lines, and the voxels of [`small`].
 
 use std::io::Write;
 
@@ -8,7 +8,7 @@ use ppa_ct::{ReadError, Scan};
 
 use crate::volumes::small;
 
-/// Lines with some fields replaced, added, or (nothing behind the separator) left out.
+/// Lines with some fields replaced, added, or removed (nothing after the separator).
 pub fn changed(lines: &[&str], changes: &[&str], separators: &[char]) -> String {
     let field = |line: &str| line.split(separators).next().unwrap().to_owned();
     let mut lines = lines.iter().map(|l| (*l).to_owned()).collect::<Vec<_>>();
@@ -33,7 +33,7 @@ pub fn gzipped(bytes: &[u8]) -> Vec<u8> {
     gzip.finish().unwrap()
 }
 
-/// Every scan is [`small`], and nothing is said against it.
+/// Every scan equals [`small`] and has no warnings.
 pub fn assert_all_small(scans: impl IntoIterator<Item = Result<Scan, ReadError>>) {
     for (way, scan) in scans.into_iter().enumerate() {
         let scan = scan.unwrap_or_else(|e| panic!("{way}: {e}"));

@@ -1,4 +1,4 @@
-//! Volumes to write and read again.
+//! Volumes to write and read back.
 
 use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Rotation3, Vector3};
 use ppa_ct::{Grid, Volume};
@@ -52,7 +52,7 @@ pub fn small() -> Volume {
     Volume::new(grid.unwrap(), hu).unwrap()
 }
 
-/// Largest difference of two affines.
+/// Largest difference between the entries of two affines.
 pub fn max_abs(a: &Matrix4<f64>, b: &Matrix4<f64>) -> f64 {
     (a - b).amax()
 }

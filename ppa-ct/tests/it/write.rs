@@ -1,4 +1,4 @@
-//! The name decides the format, and any two formats agree.
+//! The name determines the format, and any two formats agree.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ const NAMES: [&str; 7] = [
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// From format to format and on: whole values and places in f32 are the same at the end.
+    /// Through a chain of formats, integers and positions in f32 are unchanged.
     #[test]
     fn a_chain_of_conversions_changes_nothing(
         names in prop::sample::subsequence(NAMES.to_vec(), 1..=NAMES.len()).prop_shuffle(),

@@ -16,7 +16,7 @@ fn bones_of_p01_have_the_volumes_of_a_man() {
         *volume_ml.entry(bone).or_default() += step_mm.powi(3) / 1000.0;
     }
     assert_eq!(volume_ml.len(), 30, "{volume_ml:?}");
-    // Adult men; the leg bones as far as the scan shows them.
+    // Adult men; the leg bones as far as they are in the scan.
     for (name, low, high) in [
         ("talus", 30.0, 48.0),
         ("calcaneus", 48.0, 85.0),
@@ -76,7 +76,7 @@ impl Shadows {
             };
             *edges = [edges[0].min(u), edges[1].max(u)];
         }
-        // The line that the incisura throws: the most medial place of the outline between its two tubercles.
+        // The line of the incisura: the most medial point of the outline between its two tubercles.
         let shift = leg.parameters.drawn().lateral_shift_mm();
         let row = |posterior: f64| {
             let size = leg.parameters.size;

@@ -1,4 +1,4 @@
-//! Bones do not touch, and lie below the skin: the narrowest gaps are searched for and measured exactly.
+//! Bones do not touch and are below the skin: the narrowest gaps are searched for and measured exactly.
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,14 @@ use rayon::prelude::*;
 use super::{LIMB, family, lattice};
 use crate::*;
 
-/// Between two bones, mm.
+/// Smallest gap between two bones, mm.
 const LEAST_GAP_MM: f64 = 0.5;
-/// Over any bone, mm.
+/// Smallest cover over any bone, mm.
 const LEAST_COVER_MM: f64 = 1.75;
-/// The search starts at points of a lattice so far apart, from the best so many of each pair.
+/// Spacing of the lattice from which the search starts, and number of starts per pair.
 const STEP_MM: f64 = 2.5;
 const STARTS: usize = 25;
-/// Lattice points farther from a bone are not beside a narrow place.
+/// Lattice points farther from a bone are not near a narrow gap.
 const REACH_MM: f64 = 4.0;
 
 /// Signed distance to a bone, or, by the index after the last bone, to the outside of the limb.
@@ -27,7 +27,7 @@ fn distance(limb: &Limb, body: usize, p: &Point3<f64>) -> f64 {
     }
 }
 
-/// The nearest place on the surface of a body, from a place within a few millimetres.
+/// The nearest point on the surface of a body, from a point within a few millimetres.
 fn on_surface(limb: &Limb, body: usize, mut p: Point3<f64>) -> Point3<f64> {
     for _ in 0..8 {
         let slope = Vector3::from_fn(|axis, _| {
@@ -39,7 +39,7 @@ fn on_surface(limb: &Limb, body: usize, mut p: Point3<f64>) -> Point3<f64> {
     p
 }
 
-/// The gap between two bodies at the narrowest place downhill from `p`, negative where they overlap, and the place.
+/// The gap between two bodies at the narrowest point downhill from `p`, negative where they overlap, and that point.
 fn narrowest(limb: &Limb, [a, b]: [usize; 2], mut p: Point3<f64>) -> (f64, Point3<f64>) {
     let from_both = |p: &Point3<f64>| distance(limb, a, p).max(distance(limb, b, p));
     let (mut least, mut step) = (from_both(&p), 0.5 * STEP_MM);
@@ -63,7 +63,7 @@ fn narrowest(limb: &Limb, [a, b]: [usize; 2], mut p: Point3<f64>) -> (f64, Point
     (gap.norm(), p)
 }
 
-/// The narrowest gap of each pair of bodies that come close to one another, among the bones listed and the outside.
+/// The narrowest gap of each pair of close bodies, among the bones listed and the outside.
 fn gaps(limb: &Limb, bones: usize, points: impl Iterator<Item = Point3<f64>>) -> Gaps {
     let outside = limb.skeleton.bones().len();
     let mut starts: BTreeMap<[usize; 2], Vec<(f64, Point3<f64>)>> = BTreeMap::new();
@@ -99,7 +99,7 @@ fn gaps(limb: &Limb, bones: usize, points: impl Iterator<Item = Point3<f64>>) ->
 
 type Gaps = BTreeMap<[usize; 2], (f64, Point3<f64>)>;
 
-/// What is too narrow, in words.
+/// Describes the gaps that are too narrow.
 fn too_narrow(limb: &Limb, gaps: &Gaps) -> Vec<String> {
     let mut names = limb.bone_names();
     names.push("the air");
@@ -135,7 +135,7 @@ fn bones_keep_half_a_millimetre_below_the_skin() {
 
 #[test]
 fn bones_of_phantoms_by_seed_keep_apart() {
-    // Of the last two the fibula once came too close behind the syndesmosis.
+    // In the last two, the fibula was once too close behind the syndesmosis.
     let seeds: Vec<u64> = (0..16).chain([340, 2365]).collect();
     seeds.par_iter().for_each(|seed| {
         let leg = LowerLeg::from_seed(*seed, Side::Right);
@@ -166,7 +166,7 @@ fn the_ankles_of_every_fifth_of_3000_seeds_keep_apart() {
     assert!(narrow.is_empty(), "{narrow:#?}");
 }
 
-/// From a lattice half as wide the search finds the same gaps.
+/// From a lattice with half the spacing, the search finds the same gaps.
 #[test]
 fn the_search_finds_the_narrowest_places() {
     let from = |step_mm| {

@@ -1,4 +1,4 @@
-//! The points of one bone, and measures derived from them.
+//! Voxels of one bone, and measures derived from them.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use ppa_ct::Grid;
@@ -27,7 +27,7 @@ pub(super) fn bone_voxels(leg: &LowerLeg, name: &str, voxel_mm: f64) -> Vec<Poin
         .collect()
 }
 
-/// Direction in which points spread most.
+/// Direction in which the spread of points is largest.
 pub(super) fn long_axis(points: &[Point3<f64>]) -> Vector3<f64> {
     let count = points.len() as f64;
     let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count;

@@ -6,15 +6,15 @@ use super::{LIMB, family};
 use crate::lower_leg::TALUS;
 use crate::*;
 
-/// Length of the first stretch of compact bone along a ray from a place outside of bone.
+/// Length of the first section of compact bone along a ray from a point outside bone.
 fn first_cortex_mm(leg: &LowerLeg, from: &Point3<f64>, along: &Unit<Vector3<f64>>) -> f64 {
     let chords = leg.chords(from, along, 60.0);
     let cortex = chords.iter().find(|chord| chord.tissue == Tissue::Cortical);
     cortex.expect("bone within 60 mm").length_mm()
 }
 
-/// From the middle of the superior gutter up and down: 1.0 mm in the middle, and with the square of the distance 1.5 mm at the
-/// facets. The trochlea is inclined by up to 15° there.
+/// From the middle of the superior gutter up and down: 1.0 mm in the middle, increasing with the square of the distance to 1.5 mm
+/// at the facets. The trochlea is inclined by up to 15° there.
 #[test]
 fn plates_of_the_ankle_thicken_towards_both_sides() {
     for (name, leg) in family().filter(|(name, _)| ["P01", "P06", "P13"].contains(&&**name)) {
@@ -37,7 +37,7 @@ fn plates_of_the_ankle_thicken_towards_both_sides() {
     }
 }
 
-/// On top of its neck the talus has its shell only, at its dome more.
+/// The talus has only its shell on top of its neck, and more at its dome.
 #[test]
 fn plates_end_where_no_bone_is_opposite() {
     let down = Unit::new_normalize(-LIMB.truth().axis_direction.into_inner());

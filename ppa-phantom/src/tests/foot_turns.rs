@@ -1,4 +1,4 @@
-//! Rotation of the foot against the leg, from the voxels of its bones alone.
+//! Rotation of the foot relative to the leg, from the voxels of its bones alone.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 
@@ -9,7 +9,7 @@ use crate::parameters::Parameters;
 use crate::*;
 
 const VOXEL_MM: f64 = 1.5;
-/// The sole is cut softly over 8 mm, which lifts a flat skin by up to a quarter of that.
+/// Largest lift of a flat skin by the soft cut of the sole: a quarter of its width of 8 mm.
 const SOFT_SOLE_MM: f64 = 2.0;
 
 fn with(leg: &LowerLeg, change: impl Fn(&mut Parameters)) -> LowerLeg {
@@ -18,7 +18,7 @@ fn with(leg: &LowerLeg, change: impl Fn(&mut Parameters)) -> LowerLeg {
     LowerLeg::new(parameters, Side::Right)
 }
 
-/// Turn of the second metatarsal about the talocrural axis, against the same leg with a right angle at the ankle.
+/// Rotation of the second metatarsal about the talocrural axis, relative to the same leg with a right angle at the ankle.
 fn plantarflexion_deg(leg: &LowerLeg) -> f64 {
     let axis = leg.mortise.axis(&leg.parameters);
     let shaft = |leg: &LowerLeg| {
@@ -50,7 +50,7 @@ fn heel_lean_deg(leg: &LowerLeg) -> f64 {
     (up.x / up.z).atan().to_degrees()
 }
 
-/// From the lowest skin under the heel to the lowest under the ball of the foot, along the leg.
+/// Height from the lowest skin under the heel to the lowest under the ball of the foot, along the leg.
 fn slope_of_the_sole_mm(leg: &LowerLeg) -> f64 {
     let lowest = |posterior: f64| {
         let place = Point3::new(0.0, posterior, 0.0) * leg.parameters.size;

@@ -1,4 +1,4 @@
-//! Measures a lower leg in its voxels.
+//! Measurements of a lower leg in its voxels.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ pub(super) const HALF_WAY_HU: f64 = 650.0;
 /// Half-way between air and skin.
 pub(super) const SKIN_HU: f64 = -470.0;
 
-/// A measurement and what it should be.
+/// A measurement and its expected value.
 pub(super) struct Check {
     pub what: &'static str,
     pub found: f64,
@@ -50,7 +50,7 @@ pub(super) fn within(what: &'static str, found: f64, expected: f64, tolerance: f
     }
 }
 
-/// A leg and voxels around a place of it.
+/// A leg and voxels around a point of it.
 pub(super) struct Gauge<'a> {
     pub leg: &'a LowerLeg,
     pub ct: Volume,
@@ -66,7 +66,7 @@ impl<'a> Gauge<'a> {
         Self { leg, ct }
     }
 
-    /// Around the joint.
+    /// Voxels around the joint.
     pub fn joint(leg: &'a LowerLeg, voxel_mm: f64) -> Self {
         let centre = leg.truth().joint_centre - Vector3::new(0.0, 0.0, 4.0);
         Self::around(leg, &centre, [44.0, 44.0, 42.0], voxel_mm)
@@ -87,7 +87,7 @@ impl<'a> Gauge<'a> {
             .unwrap_or(f64::INFINITY)
     }
 
-    /// From a place in a gap: where bone begins behind and in front along a line.
+    /// From a point in a gap, the positions along a line at which bone begins behind and in front.
     pub fn gap(&self, start: &Point3<f64>, along: &Unit<Vector3<f64>>) -> [f64; 2] {
         let [back, front] =
             [-1.0, 1.0].map(|sign| self.reach(start, &along.scale(sign), HALF_WAY_HU, true));
@@ -99,7 +99,7 @@ impl<'a> Gauge<'a> {
     }
 
     /// The medial and the lateral facet of the talus: plane, width of its gutter, angle at which it opens, and its
-    /// place along the mortise's medial axis.
+    /// position along the mortise's medial axis.
     pub fn facets(&self) -> [(Plane, f64, f64, f64); 2] {
         let truth = self.leg.truth();
         let beside = 0.5 * truth.trochlea_width_mm + 2.0;
@@ -119,7 +119,7 @@ impl<'a> Gauge<'a> {
         ]
     }
 
-    /// Point on a facet nearest to another one, and the direction across its gutter; `ct`.
+    /// Point on a facet nearest to another point, and the direction across its gutter; `ct`.
     pub fn on_facet(&self, facet: &Plane, near: &Point3<f64>) -> (Point3<f64>, Unit<Vector3<f64>>) {
         let near = self.leg.limb_point(near);
         let on_facet = near - facet.normal.scale(facet.distance(&near));
@@ -156,7 +156,7 @@ impl<'a> Gauge<'a> {
     }
 
     /// Bone on a ray through each of the points, in mm of bone of 1000 HU, for a beam from front to back with the
-    /// limb turned inwards.
+    /// limb rotated inwards.
     pub fn bone_on_ray(&self, points: &[Point3<f64>], internal_rotation_deg: f64) -> f64 {
         let angle = -internal_rotation_deg.to_radians();
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), angle);
@@ -187,8 +187,8 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// The internal rotation of the least of 61 values from -10 to 50 degrees, each the amount of bone in mm: the middle of
-/// the angles around it with at most a millimetre more, since the valley is flat and other bones lie across it.
+/// Internal rotation at the minimum of 61 values from -10 to 50 degrees, each the amount of bone in mm: the middle of
+/// the angles around it with at most a millimetre more, since the minimum is flat and other bones overlap it.
 pub(super) fn least_deg(values: &[f64]) -> f64 {
     let least =
         (0..values.len()).fold(0, |best, n| if values[n] < values[best] { n } else { best });

@@ -10,8 +10,8 @@ use crate::parameters::Parameters;
 use crate::sdf::Shape;
 use crate::*;
 
-/// The place on the tibia at a height that faces most directly away from the middle of the shaft, and its normal:
-/// elsewhere the shell, cut obliquely, is thicker.
+/// The point on the tibia at a height that faces most directly away from the middle of the shaft, and its normal:
+/// elsewhere the shell is cut obliquely and appears thicker.
 fn facing_outwards(leg: &LowerLeg, height_mm: f64) -> (Point3<f64>, Vector3<f64>) {
     let to_tibia = |p: &Point3<f64>| leg.skeleton.distance(TIBIA, &leg.limb_point(p));
     let inside = leg.mortise_point(0.5, 0.5, height_mm);
@@ -60,7 +60,7 @@ pub(super) fn leg(leg: &LowerLeg, voxel_mm: f64) -> Vec<Check> {
         [mean, (square / hu.len() as f64).sqrt()]
     };
     let [_, deviation] = mean_and_deviation(leg);
-    // Texture moves the mean of so small a box by a quarter of its deviation.
+    // Texture shifts the mean of so small a box by a quarter of its deviation.
     let even = Parameters {
         trabecular_texture_hu: 0.0,
         ..leg.parameters
@@ -96,7 +96,7 @@ pub(super) fn leg(leg: &LowerLeg, voxel_mm: f64) -> Vec<Check> {
         let found: f64 = (0..90)
             .map(|n| (outline[n] - outline[(n + 1) % 90]).norm())
             .sum();
-        // A radius off by a voxel.
+        // The error of a radius by one voxel.
         checks.push(within("girth", found, girth, TAU));
     }
     checks

@@ -1,4 +1,4 @@
-//! Lofts against bodies whose distance is known.
+//! Lofts compared with bodies whose distance is known.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! Every parameter, recovered by measurement from the voxels.
+//! Every parameter, recovered from the voxels.
 
 use std::f64::consts::PI;
 
@@ -17,7 +17,7 @@ fn joint(gauge: &Gauge, voxel_mm: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     let centre = truth.talocrural_centre;
     let axis = truth.talocrural_axis;
-    // The dome lies above a place of its inclined axis that is further medial.
+    // The dome is above a point of its inclined axis that is further medial.
     let above = p.trochlea_radius_mm * p.axis_inclination_rad.sin();
     for (medial, posterior) in [(-6.0, 0.0), (0.0, -6.0), (0.0, 6.0), (6.0, 0.0)] {
         let (medial, posterior) = (medial * size + above, posterior * size);
@@ -130,7 +130,7 @@ fn mortise(gauge: &Gauge, voxel_mm: f64) -> Vec<Check> {
     let outline: Vec<[f64; 2]> = (-28..=28)
         .map(|n| 0.5 * f64::from(n) * size)
         .map(|posterior| {
-            // Beside the fibula the tibia is met from soft tissue, in front of it from the syndesmosis.
+            // Next to the fibula the tibia is reached from soft tissue, in front of it from the syndesmosis.
             let on_tibia = (0..400)
                 .map(|n| -36.0 + 0.1 * f64::from(n))
                 .find(|medial| {
@@ -149,7 +149,7 @@ fn mortise(gauge: &Gauge, voxel_mm: f64) -> Vec<Check> {
     checks
 }
 
-/// How deep an outline (medial, posterior) dips below the line over its two tubercles.
+/// Depth of an outline (medial, posterior) below the line over its two tubercles.
 fn incisura_depth_mm(outline: &[[f64; 2]]) -> f64 {
     let middle = outline.len() / 2;
     let mut deepest: f64 = 0.0;
@@ -158,7 +158,7 @@ fn incisura_depth_mm(outline: &[[f64; 2]]) -> f64 {
             let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
             let depth = |p: &[f64; 2]| ((p[0] - a[0]) * dy - (p[1] - a[1]) * dx) / dx.hypot(dy);
             let depths = || outline.iter().map(depth);
-            // A tangent: nothing lies outside of it.
+            // A tangent: no point is outside it.
             if depths().fold(f64::INFINITY, f64::min) > -0.1 {
                 let between = outline.iter().filter(|p| (a[1]..b[1]).contains(&p[1]));
                 deepest = between.map(depth).fold(deepest, f64::max);
@@ -179,7 +179,7 @@ fn measure(name: &str, phantom: &LowerLeg, voxel_mm: f64) {
     assert!(failed.is_empty(), "{name}: {failed:#?}");
 }
 
-/// The phantoms that every run of the tests measures.
+/// The phantoms measured in every run of the tests.
 const THREE: [&str; 3] = ["P01", "P06", "P13"];
 
 #[test]

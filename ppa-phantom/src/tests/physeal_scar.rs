@@ -6,8 +6,8 @@ use super::LIMB;
 use crate::parameters::{P01, Parameters};
 use crate::*;
 
-/// How far above a place in the tibia the densest voxel of a column around it lies, mm, and the sum over the column of what lies
-/// above its ends, HU mm.
+/// Height of the densest voxel of a column above a point in the tibia, mm, and the sum over the column of the excess above the
+/// values at its ends, HU mm.
 fn peak(leg: &LowerLeg, [medial, posterior, proximal]: [f64; 3], voxel_mm: f64) -> [f64; 2] {
     let low = leg.mortise_point(medial, posterior, proximal) - Vector3::z() * 3.0;
     let high = low + Vector3::z() * 6.0 + Vector3::repeat(1e-6);
@@ -39,7 +39,7 @@ fn physeal_scar_crosses_the_tibia_above_the_joint() {
             assert!((sum - 221.0).abs() < 50.0, "{sum}");
         }
     }
-    // With the texture of P01 it still is the densest line across the bone.
+    // With the texture of P01 it is still the densest line across the bone.
     let rows: Vec<f64> = (0..24)
         .map(|n| {
             let mean = |n: f64| {

@@ -31,7 +31,7 @@ fn metatarsals_and_phalanges_have_the_published_proportions() {
             toes.iter().skip(1).all(|length| *length < toes[0]),
             "{name}: {toes:?}"
         );
-        // In others the heads of the metatarsals lie further forward or back.
+        // In other phantoms the heads of the metatarsals are further forward or back.
         if name == "P01" {
             assert!((mm[0] - mean).abs() < 1.0, "{mm:?}");
             assert!(mm.iter().skip(1).all(|length| *length > mm[0]), "{mm:?}");
@@ -40,7 +40,7 @@ fn metatarsals_and_phalanges_have_the_published_proportions() {
     }
 }
 
-/// The height of the dome along a line across the talus: the deepest place between its two crests is in the middle.
+/// The height of the dome along a line across the talus: the lowest point between its two crests is in the middle.
 #[test]
 fn the_groove_of_the_trochlea_is_in_the_middle_of_the_dome() {
     for (name, leg) in family() {

@@ -1,4 +1,4 @@
-//! Rays, normals and gutters against the shapes walked in small steps, and against closed formulas.
+//! Rays, normals and gutters compared with shapes sampled in small steps and with closed formulas.
 
 use nalgebra::{Point3, Unit, Vector3};
 use proptest::prelude::*;
@@ -15,8 +15,8 @@ fn ray(near: [f64; 3], turn: f64, tilt: f64) -> (Point3<f64>, Unit<Vector3<f64>>
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
-    /// Against the tissue at 80 000 points of the ray: each boundary may be misjudged by half a step of 0.01 mm, and a
-    /// stretch below 0.02 mm missed.
+    /// Compared with the tissue at 80 000 points of the ray: each boundary may be off by half a step of 0.01 mm, and a
+    /// section below 0.02 mm missed.
     #[test]
     fn chords_are_the_tissues_along_the_ray(
         near in prop::array::uniform3(-25.0..25.0_f64), turn in -3.2..3.2_f64, tilt in -0.7..0.7_f64,
@@ -44,10 +44,10 @@ proptest! {
         prop_assert!(chords.windows(2).all(|w| w[0].to_mm < w[1].from_mm || joined(w)));
     }
 
-    /// The first chord begins where the skin is hit; the hit lies on the skin, and the distance grows along the normal.
+    /// The first chord begins where the skin is hit; the hit is on the skin, and the distance grows along the normal.
     ///
-    /// Where two parts blend into a crease the blended distance grows more slowly than the true one: of 18,084 hits 13
-    /// had a slope below 0.7, the least 0.56; the largest was 1.09.
+    /// Where two parts blend into a crease the blended distance grows more slowly than the true one: of 18,084 hits, 13
+    /// had a slope below 0.7; the smallest was 0.56 and the largest 1.09.
     #[test]
     fn a_ray_hits_the_skin_where_its_first_chord_begins(
         near in prop::array::uniform3(-40.0..40.0_f64), turn in -3.2..3.2_f64, tilt in -0.7..0.7_f64,
@@ -69,7 +69,7 @@ proptest! {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
-    /// From inside: where the skin is left for the first time, against points of the ray 0.05 mm apart.
+    /// From inside: the first exit through the skin, compared with points of the ray 0.05 mm apart.
     #[test]
     fn a_ray_from_inside_hits_the_skin_where_it_leaves_the_limb(
         near in prop::array::uniform3(-8.0..8.0_f64), turn in -3.2..3.2_f64, tilt in -1.5..0.7_f64,
@@ -86,7 +86,7 @@ proptest! {
     }
 }
 
-/// A vertical ray through the marrow of the shaft crosses the cortex nowhere and leaves at the cut only.
+/// A vertical ray through the marrow of the shaft never crosses the cortex and leaves only at the cut.
 #[test]
 fn a_ray_up_the_shaft_stays_in_marrow() {
     let truth = LIMB.truth();
@@ -97,7 +97,7 @@ fn a_ray_up_the_shaft_stays_in_marrow() {
     assert!((chords[0].length_mm() - 100.0).abs() < 1e-9);
 }
 
-/// The bony gaps of the parameters are those of the gutters; towards the edges, and where the malleoli bend away, they widen.
+/// The bony gaps of the parameters are those of the gutters; they widen towards the edges and where the malleoli bend away.
 #[test]
 fn gutters_have_the_widths_of_the_truth() {
     for leg in [
@@ -120,7 +120,7 @@ fn gutters_have_the_widths_of_the_truth() {
                 "{what}: {narrow} for {width}"
             );
             assert!(widths[0] > 0.75 * width, "{what}: {}", widths[0]);
-            // The bones behind a place at the rounded edge may be thinner than half a millimetre.
+            // The bones behind a point at the rounded edge may be thinner than half a millimetre.
             let other = if what == "lateral" { "fibula" } else { "tibia" };
             let between = points.iter().filter(|point| {
                 let reach = point.across.scale(0.5 * point.width_mm + 0.1);

@@ -8,7 +8,7 @@ use ppa_ct::Volume;
 
 use crate::Scanner;
 
-/// A point spreads to a Gaussian of the stated width; noise has the stated standard deviation and no memory.
+/// A point spreads to a Gaussian of the stated width; noise has the stated standard deviation and no correlation.
 #[test]
 fn the_scanner_blurs_and_adds_noise_as_told() {
     let grid =

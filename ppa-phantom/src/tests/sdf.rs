@@ -27,7 +27,7 @@ proptest! {
             "{distance} against {nearest}");
     }
 
-    /// A blend adds material, at most a quarter of its width, and nothing away from the seam.
+    /// A blend adds at most a quarter of its width, and nothing away from the seam.
     #[test]
     fn smooth_min_stays_within_a_quarter_of_the_blend(a in -20.0..20.0_f64, b in -20.0..20.0_f64, k in 0.1..10.0_f64) {
         let (sharp, smooth) = (a.min(b), smooth_min(a, b, k));
@@ -35,7 +35,7 @@ proptest! {
         prop_assert!((a - b).abs() < k || smooth == sharp);
     }
 
-    /// The surface of an ellipsoid is where the formula of an ellipsoid puts it, with slope 1.
+    /// The surface of an ellipsoid agrees with the formula, with slope 1.
     #[test]
     fn ellipsoid_is_exact_to_first_order(direction in point(1.0), offset in -0.5..0.5_f64) {
         prop_assume!(direction.coords.norm() > 0.1);

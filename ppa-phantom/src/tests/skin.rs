@@ -31,7 +31,7 @@ fn skin_distance_has_slope_one_near_the_skin() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
-    /// Walking the distance back along the slope ends on the skin, up to the 20 % by which the slope may be
+    /// Following the distance along its gradient ends on the skin, up to the 20 % by which the slope may be
     /// off, from random points around the shank.
     #[test]
     fn skin_distance_leads_to_the_skin(

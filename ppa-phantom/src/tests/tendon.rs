@@ -5,7 +5,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use super::family;
 use crate::*;
 
-/// Area in mm² and depth from front to back in mm of the tendon in a plane across the leg.
+/// Area in mm² and front-to-back depth in mm of the tendon in a plane across the leg.
 fn section(leg: &LowerLeg, height_mm: f64) -> [f64; 2] {
     const STEP_MM: f64 = 0.4;
     let mut deepest: f64 = 0.0;
@@ -22,7 +22,7 @@ fn section(leg: &LowerLeg, height_mm: f64) -> [f64; 2] {
     [area, deepest]
 }
 
-/// Where the calf is thin as where it is thick: an even cord below the skin, as large as that of P01 at the same size.
+/// For thin and thick calves: an even cord below the skin, as large as that of P01 at the same size.
 #[test]
 fn the_achilles_tendon_follows_the_skin() {
     let seeds = (0..12).map(|n| (format!("seed {n}"), LowerLeg::from_seed(n, Side::Right)));

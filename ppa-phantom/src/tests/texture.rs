@@ -1,4 +1,4 @@
-//! Spongy bone: spectrum, distances and directions of its texture, and its density.
+//! Spongy bone: spectrum, spacing and directions of its texture, and its density.
 
 use std::f64::consts::{PI, TAU};
 
@@ -32,7 +32,7 @@ fn exponent(image: &[f64], n: usize, pixel_mm: f64, [low, high]: [f64; 2]) -> f6
     let step = 1.0 / (n as f64 * pixel_mm);
     let most = (high / step) as i32;
     let wave = |f: i32, i: usize| (TAU * f64::from(f) * i as f64 / n as f64).sin_cos();
-    // Rows first: one sum per row and frequency across.
+    // Rows first: one sum per row and horizontal frequency.
     let rows: Vec<Vec<[f64; 2]>> = (0..n)
         .map(|j| {
             let row = |f: i32| {
@@ -78,7 +78,7 @@ fn exponent(image: &[f64], n: usize, pixel_mm: f64, [low, high]: [f64; 2]) -> f6
     -product / points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>()
 }
 
-/// Of a block of 32 x 12 x 32 mm. The exponents of seeds spread by 0.18, so that the mean of four is good to 0.09.
+/// For a block of 32 x 12 x 32 mm. The exponents of seeds vary by 0.18, so that the mean of four is accurate to 0.09.
 #[test]
 fn projected_texture_falls_by_a_power_of_2_6_to_3() {
     const N: usize = 128;
@@ -103,8 +103,8 @@ fn projected_texture_falls_by_a_power_of_2_6_to_3() {
     }
 }
 
-/// Along a line of 4 m across the trabeculae, sampled 20 times per trabecula: one maximum for each. Crossings of the mean along the
-/// trabeculae are fewer by the anisotropy.
+/// Along a line of 4 m across the trabeculae, sampled 20 times per trabecula: one maximum for each. Along the trabeculae, crossings of
+/// the mean are fewer by the anisotropy.
 #[test]
 fn trabeculae_are_as_far_apart_as_stated() {
     for (name, bone) in SPONGY {
@@ -123,7 +123,7 @@ fn trabeculae_are_as_far_apart_as_stated() {
         let maxima = |w: &&[f64]| w[0] < w[1] && w[1] >= w[2];
         let maxima = across.windows(3).filter(maxima).count() as f64;
         println!("{name}: {:.3} maxima per trabecula", maxima / 5000.0);
-        // 5000 maxima, whose number spreads by less than that of independent ones.
+        // 5000 maxima, whose number varies less than that of independent ones.
         assert!((maxima / 5000.0 - 1.0).abs() < 0.05, "{name}: {maxima}");
         let crossings = |values: &[f64]| {
             let crossing = |w: &&[f64]| (w[0] < 0.0) != (w[1] < 0.0);
@@ -163,7 +163,7 @@ fn metaphysis(leg: &LowerLeg, half_mm: f64, voxel_mm: f64) -> Vec<f64> {
     ct.unwrap().hu().iter().map(|hu| f64::from(*hu)).collect()
 }
 
-/// Means over 4³ voxels of 0.25 mm spread like voxels of 1 mm and agree with them but for what is finer than a voxel.
+/// Means over 4³ voxels of 0.25 mm vary like voxels of 1 mm and agree with them except for detail finer than a voxel.
 #[test]
 fn coarse_voxels_show_the_mean_of_fine_ones() {
     let (leg, even) = (p01(5, 45.0), p01(5, 0.0));
@@ -202,7 +202,7 @@ fn texture_leaves_the_mean_density_of_spongy_bone() {
         .collect();
     for (name, bone) in SPONGY {
         assert_eq!(names[bone], name);
-        // Two centimetres of the tibia above the joint; only where neither cortex nor marrow is near.
+        // Two centimetres of the tibia above the joint; only voxels away from cortex and marrow.
         let inside: Vec<usize> = (0..labels.len())
             .filter(|n| usize::from(labels[*n]) == bone + 1)
             .filter(|n| {
@@ -223,7 +223,7 @@ fn texture_leaves_the_mean_density_of_spongy_bone() {
             "{name}: {expected:.1} HU in {} voxels, {found:.1?}",
             inside.len()
         );
-        // The coarse octaves move the mean of a bone by 6 HU: three standard errors of four seeds.
+        // The coarse octaves shift the mean of a bone by 6 HU: three standard errors of four seeds.
         let shift = found.iter().sum::<f64>() / 4.0;
         assert!(shift.abs() < 9.0, "{name}: {found:?}");
     }

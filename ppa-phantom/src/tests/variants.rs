@@ -7,7 +7,7 @@ use super::{LIMB, family};
 use crate::parameters::{P01, Parameters};
 use crate::*;
 
-/// P01 to P17 span what they should, and the fixed table holds P01 as it is.
+/// P01 to P17 span the published range, and the fixed table contains P01 unchanged.
 #[test]
 fn the_family_has_published_sexes_and_mortise_angles() {
     let legs: Vec<LowerLeg> = family().map(|(_, leg)| leg).collect();
@@ -37,7 +37,7 @@ fn other_names_are_refused() {
     }
 }
 
-/// Means over 400 seeds within 4 standard errors, 1e-4 false alarms each; none beyond two standard deviations.
+/// Means over 400 seeds within 4 standard errors, 1e-4 false alarms each; no value beyond two standard deviations.
 #[test]
 fn seeds_draw_dimensions_around_the_published_means() {
     let legs: Vec<LowerLeg> = (0..400)
@@ -53,7 +53,7 @@ fn seeds_draw_dimensions_around_the_published_means() {
         let sizes: Vec<f64> = of_sex.iter().map(|leg| leg.parameters.size).collect();
         let angle = |leg: &&LowerLeg| leg.truth().mortise_angle_rad.to_degrees();
         let angles: Vec<f64> = of_sex.iter().map(angle).collect();
-        // Cutting at 10 and 29 degrees moves the mean by a fifteenth of the deviation at most.
+        // Truncation at 10 and 29 degrees moves the mean by at most a fifteenth of the deviation.
         for (values, [mean, deviation]) in [(sizes, size), (angles, mortise_deg)] {
             let found = values.iter().sum::<f64>() / n;
             assert!(
@@ -90,7 +90,7 @@ fn mortise_angles_of_all_seeds_lie_between_10_and_29_degrees() {
     }
 }
 
-/// Spongy bone of one shape with the seeds of several phantoms: as dense on average, nowhere alike.
+/// Spongy bone of one shape with the seeds of several phantoms: equally dense on average, different everywhere.
 #[test]
 fn every_phantom_has_spongy_bone_of_its_own() {
     let shape = LowerLeg::family("P02", Side::Right).unwrap().parameters;
@@ -125,13 +125,13 @@ fn every_phantom_has_spongy_bone_of_its_own() {
         for b in &fields[n + 1..] {
             let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let alike = product(a, b) / (product(a, a) * product(b, b)).sqrt();
-            // As many independent places as the box holds cells of the coarse octaves, about 100.
+            // The number of independent values is the number of cells of the coarse octaves in the box, about 100.
             assert!(alike.abs() < 4.0 / 100.0_f64.sqrt(), "{alike}");
         }
     }
 }
 
-/// Voxels, tissues, rays and truth of the mirror image of P01, which no jitter changes.
+/// Voxels, tissues, rays and truth of the mirror image of P01, which has no variation between sides.
 #[test]
 fn a_left_limb_is_the_mirror_image() {
     let left = LowerLeg::new(P01, Side::Left);
@@ -170,7 +170,7 @@ fn a_left_limb_is_the_mirror_image() {
     assert_eq!(chords, left.chords(&mirror(origin), &mirrored, 600.0));
 }
 
-/// A box whose corners are voxels of the whole shows the voxels of the whole, of either side.
+/// A box whose corners are voxels of the full volume has the same voxels, on either side.
 #[test]
 fn a_box_shows_the_same_values_as_the_whole() {
     for side in [Side::Right, Side::Left] {
@@ -182,7 +182,7 @@ fn a_box_shows_the_same_values_as_the_whole() {
         let part = whole.crop(low, high).unwrap();
         let [first, last] =
             [low, high.map(|n| n - 1)].map(|voxel| whole.grid().centre(voxel.map(|v| v as f64)));
-        // A little larger, so that rounding loses no voxel: where the box begins, it begins exactly.
+        // Slightly larger, so that rounding loses no voxel; the start of the box is exact.
         let more = Vector3::repeat(1e-6);
         let (mut from, mut to) = (first, last + more);
         if side == Side::Left {

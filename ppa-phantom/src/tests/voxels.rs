@@ -1,4 +1,4 @@
-//! From shapes to voxels.
+//! Voxels compared with the shapes.
 
 use nalgebra::Vector3;
 use ppa_ct::Volume;
@@ -25,7 +25,7 @@ fn partial_volume_keeps_the_mass_at_any_spacing() {
     }
 }
 
-/// Against the tissue at 10³ points inside each voxel; bones left out, whose units vary inside.
+/// Compared with the tissue at 10³ points inside each voxel; bones are left out, since their HU varies inside.
 #[test]
 fn a_voxel_at_the_skin_is_the_mean_of_the_tissues_in_it() {
     let spacing_mm = 3.0;
@@ -88,7 +88,7 @@ fn spacing_outside_the_range_is_refused() {
     }
 }
 
-/// Before any memory is asked for; an empty box is refused too.
+/// Refused before memory is reserved; an empty box is refused too.
 #[test]
 fn more_voxels_than_2_gib_hold_are_refused() {
     let centre = LIMB.truth().joint_centre;

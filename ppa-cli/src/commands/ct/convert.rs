@@ -1,4 +1,4 @@
-//! `ppa ct convert`: a CT from any format that is read to any that is written.
+//! `ppa ct convert`: converts a CT between supported formats.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use crate::output::{Output, working};
 use crate::output_files::ReplaceArgs;
 use crate::scan_args::ScanArgs;
 
-/// What lies outside a tilted stack that was set upright.
+/// Value outside a tilted stack that was made upright.
 const AIR_HU: f32 = -1000.0;
 
 #[derive(Debug, Args)]
@@ -86,9 +86,9 @@ pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
     source.volume = args.changed(source.volume)?;
     drop(stoppable);
     source.write(&args.output)?;
-    // Told from the file, so that what is printed is what others will read.
+    // Read back from the file, so that the output shows what other readers will find.
     let mut info = Info::of(&read(&args.output)?);
-    // What the file cannot show about the scan it was made from; a tilt it does.
+    // Warnings that the file cannot show about the original scan; it does show a tilt.
     let lost = source.warnings.into_iter().filter(|warning| {
         let report = info.warnings.iter().any(|w| w.code == warning.code);
         !report && warning.code != WarningCode::GantryTilt

@@ -1,4 +1,4 @@
-//! `ppa ct info`: the facts about a CT, and the import audit.
+//! `ppa ct info`: properties of a CT, and the import audit.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub struct InfoArgs {
     replace: ReplaceArgs,
 }
 
-/// What is printed.
+/// Output of the command.
 #[derive(Serialize)]
 struct Audited {
     #[serde(flatten)]
@@ -40,7 +40,7 @@ pub fn run(args: &InfoArgs, output: Output) -> anyhow::Result<()> {
         outputs.file_in_new_folder("--report", report, &[".html", ".htm"])?;
     }
     let scan = args.scan.read()?;
-    // Blocks of voxels as real numbers, and which of them are tissue.
+    // Blocks of voxels as floats, and a mask of tissue.
     scan.volume.expect_room(8)?;
     let audited = Audited {
         info: Info::of(&scan),

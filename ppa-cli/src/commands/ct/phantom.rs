@@ -88,7 +88,7 @@ struct Made {
     labels: Vec<&'static str>,
 }
 
-/// Refuses names under which nothing, or the wrong thing, would be found later.
+/// Refuses output names that would cause a missing or wrong file later.
 fn check_outputs(args: &PhantomArgs) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
     outputs.volume("--out", &args.out)?;
@@ -157,7 +157,7 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-/// What it is called, its shape, and what is true about it.
+/// Name of the limb, its shape, and its ground truth.
 fn limb(args: &PhantomArgs) -> anyhow::Result<(String, Limb, Option<Truth>)> {
     let side = Side::from(args.side);
     if args.limb == LimbName::Knee {

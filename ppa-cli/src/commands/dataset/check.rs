@@ -41,7 +41,7 @@ pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     working.finish_and_clear();
     let mut problems: Vec<_> = match &found {
         Ok(found) => found.flaws.iter().map(Flaw::to_string).collect(),
-        // What does not fit the layout may do so because of what is damaged.
+        // A deviation from the layout may be caused by the damage.
         Err(_) => Vec::new(),
     };
     for (file, problem) in recorded {
@@ -71,7 +71,7 @@ fn split_problems(dataset: &Path, splits: &[String]) -> anyhow::Result<Vec<Strin
     Ok(splits.iter().filter_map(problem).collect())
 }
 
-/// What differs from the records of the dataset, where there are any, with the file at fault.
+/// Differences from the records of the dataset, if there are any, with the file concerned.
 fn against_records(dataset: &Path) -> anyhow::Result<Vec<(Option<String>, String)>> {
     if !dataset.join(".ppa").is_dir() {
         return Ok(Vec::new());
@@ -80,7 +80,7 @@ fn against_records(dataset: &Path) -> anyhow::Result<Vec<(Option<String>, String
     match ppa_generate::check(dataset) {
         Ok(check) => Ok(check.problems.iter().map(described).collect()),
         Err(error @ FolderError::Busy(_)) => Err(error.into()),
-        // A file without which the others cannot be compared.
+        // A file without which the others cannot be checked.
         Err(error) => Ok(vec![(None, format!("{:#}", anyhow::Error::from(error)))]),
     }
 }

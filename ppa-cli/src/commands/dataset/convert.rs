@@ -1,4 +1,4 @@
-//! `ppa dataset convert`: from one published layout to the other.
+//! `ppa dataset convert`: converts one published layout to the other.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `ppa dataset split`: persons for training and testing.
+//! `ppa dataset split`: splits persons into parts for training and testing.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `ppa depth coverage`: where a camera would see most of a joint.
+//! `ppa depth coverage`: camera positions that see most of a joint.
 
 use std::path::{Path, PathBuf};
 
@@ -57,7 +57,7 @@ pub struct CoverageArgs {
     replace: ReplaceArgs,
 }
 
-/// Most places that are tried: each is an image.
+/// Largest number of positions: an image is rendered for each.
 const MOST_PLACES: usize = 10_000;
 
 #[derive(Debug, Deserialize)]
@@ -98,7 +98,7 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     output.print(&study, describe)
 }
 
-/// The cameras of the rig, and the places that are tried.
+/// The cameras of the rig, and the positions to try.
 fn places(args: &CoverageArgs, joint: &JointInRoom) -> anyhow::Result<Vec<CameraPlace>> {
     let camera = super::read_camera(args.camera.as_ref())?;
     camera.rays(); // once, and shared by all clones

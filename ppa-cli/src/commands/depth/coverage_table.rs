@@ -4,10 +4,10 @@ use ppa_core::text::{count, number};
 use ppa_depth::Viewpoint;
 use ppa_generate::{CoverageStudy, RankedPlace};
 
-/// Places of the table on the screen, besides those of the rig.
+/// Number of positions printed, in addition to those of the rig.
 const SHOWN: usize = 12;
 
-/// The best places, and those of the rig, as text.
+/// Describes the best positions and those of the rig.
 pub fn describe(study: &CoverageStudy) -> String {
     let mut lines = vec![
         format!(
@@ -42,7 +42,7 @@ pub fn describe(study: &CoverageStudy) -> String {
     ));
     lines.join("\n")
 }
-/// A cell that spreadsheets do not run.
+/// A cell that spreadsheets do not evaluate as a formula.
 fn as_text(name: &str) -> String {
     let mark = if ppa_dataset::is_formula(name) {
         "'"
@@ -52,7 +52,7 @@ fn as_text(name: &str) -> String {
     format!("{mark}{name}")
 }
 
-/// All places as CSV.
+/// All positions as CSV.
 pub fn table_csv(rows: &[RankedPlace]) -> anyhow::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record([
@@ -78,7 +78,7 @@ pub fn table_csv(rows: &[RankedPlace]) -> anyhow::Result<Vec<u8>> {
         } = row.viewpoint;
         let [x, y, z] = [0, 1, 2].map(|axis| row.room_from_camera[axis][3]);
         let c = &row.coverage;
-        // Thousandths are enough for all of them.
+        // Three decimals are enough for all of them.
         let [
             azimuth,
             elevation,

@@ -1,4 +1,4 @@
-//! `ppa depth fit-noise`: a sensor that has the noise of a recording.
+//! `ppa depth fit-noise`: fits a sensor model to the noise of a recording.
 
 use std::path::{Path, PathBuf};
 
@@ -58,7 +58,7 @@ pub fn run(args: &FitNoiseArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-/// All PNGs of a folder, in the order of their names.
+/// Reads all PNGs of a folder, sorted by name.
 fn read_frames(folder: &Path) -> anyhow::Result<Vec<DepthImage>> {
     let unreadable = || format!("cannot read {}", folder.display());
     let mut paths = std::fs::read_dir(folder)

@@ -1,4 +1,4 @@
-//! `ppa depth project`: the camera model by itself.
+//! `ppa depth project`: projects points with the camera model.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub struct ProjectArgs {
     camera: Option<PathBuf>,
 }
 
-/// Reads rows of x, y, z; a first row of three words of which none is a number is a header.
+/// Reads rows of x, y, z; a first row of three words, none of them a number, is a header.
 fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
     let file = ppa_core::regular_file::open(path)
         .with_context(|| format!("cannot read {}", path.display()))?;

@@ -1,4 +1,4 @@
-//! Options of `ppa depth render`, and the files that it writes of an image.
+//! Options of `ppa depth render`, and the files that it writes for an image.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ enum ViewName {
 }
 
 impl OfCase {
-    /// The first option that only a case has.
+    /// The first given option that applies only to a case.
     fn given(&self) -> Option<&'static str> {
         let given = [
             ("--angle", self.angle.is_some()),
@@ -48,7 +48,7 @@ impl OfCase {
             .map(|(name, _)| name)
     }
 
-    /// The camera that was chosen.
+    /// The chosen camera.
     pub fn view(&self) -> Option<View> {
         self.view.map(|view| match view {
             ViewName::Left => View::Left,
@@ -106,7 +106,7 @@ pub struct RenderArgs {
     pub(super) replace: ReplaceArgs,
 }
 
-/// A sensor from a file, or the default one.
+/// Reads a sensor from a file, or returns the default one.
 pub(super) fn read_sensor(path: &Path) -> anyhow::Result<SensorSpec> {
     if path.as_os_str() == "default" {
         return Ok(SensorSpec::default());
@@ -115,7 +115,7 @@ pub(super) fn read_sensor(path: &Path) -> anyhow::Result<SensorSpec> {
 }
 
 impl RenderArgs {
-    /// The case, if it is one that is to be rendered and no meshes.
+    /// The path of the case, if a case rather than meshes is to be rendered.
     pub fn case(&self) -> anyhow::Result<Option<&Path>> {
         if let [case] = &self.meshes[..]
             && is_case(case)
@@ -135,7 +135,7 @@ impl RenderArgs {
     }
 }
 
-/// Whether a file is a case and no mesh.
+/// Whether a file is a case rather than a mesh.
 fn is_case(path: &Path) -> bool {
     path.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
@@ -151,7 +151,7 @@ pub(super) fn of_view(path: &Path, view: Option<View>) -> PathBuf {
     path.with_file_name(format!("{stem}_{}.{extension}", name(view)))
 }
 
-/// Name of a camera, as users read it.
+/// Name of a camera for users.
 pub(super) fn name(view: View) -> &'static str {
     match view {
         View::Left => "left",
@@ -159,7 +159,7 @@ pub(super) fn name(view: View) -> &'static str {
     }
 }
 
-/// Writes the other files of an image, with the camera's name if there are several.
+/// Writes the other files of an image, with the camera's name if there are several images.
 pub(super) fn write_others(
     args: &RenderArgs,
     view: Option<View>,

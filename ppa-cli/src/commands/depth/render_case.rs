@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::render::{RenderArgs, name, of_view, read_sensor, write_others};
 use crate::output::{Output, working};
 
-/// Tries the files that the images of a case go to.
+/// Declares the output files for the images of a case.
 fn declare(args: &RenderArgs) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
     let views: &[Option<View>] = match args.of_case.view() {
@@ -77,7 +77,7 @@ pub fn run(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()>
     views.retain(|seen| wanted.is_none_or(|view| view == seen.view));
     let mut written = Vec::new();
     for seen in &views {
-        // One image has the name as it was given.
+        // A single image keeps the given name.
         let named = wanted.is_none().then_some(seen.view);
         written.push(write_view(args, named, seen)?);
     }
@@ -126,7 +126,7 @@ fn write_view(
     })
 }
 
-/// A case's cameras stand where its room says.
+/// Refuses options of meshes: the room of a case defines its cameras.
 fn refuse_options_of_meshes(path: &Path, args: &RenderArgs) -> anyhow::Result<()> {
     let given = [
         ("--camera", args.camera.is_some()),

@@ -17,10 +17,10 @@ use super::render::{RenderArgs, read_sensor, write_others};
 use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch};
 
-/// Frames over which a tremor remembers: a third of a second at 30 frames per second.
+/// Correlation time of the tremor in frames: a third of a second at 30 frames per second.
 const TREMOR_FRAMES: f64 = 10.0;
 
-/// A row-major 4x4 matrix, as four rows or as 16 numbers, or several of them by name.
+/// A row-major 4x4 matrix, as four rows or as 16 numbers, or several matrices by name.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum Pose {
@@ -37,7 +37,7 @@ struct Rendered {
     height: u32,
     frames: u64,
     valid_pixels: usize,
-    /// Pixels farther than a 16-bit PNG can say, 0 in the file; of the first frame.
+    /// Pixels too far for a 16-bit PNG, which are 0 in the file; of the first frame.
     too_far_pixels: usize,
     min_mm: Option<f32>,
     max_mm: Option<f32>,
@@ -165,7 +165,7 @@ fn sensor(args: &RenderArgs) -> anyhow::Result<Option<Sensor>> {
 }
 
 impl RenderArgs {
-    /// The file of a frame.
+    /// Path of a frame's file.
     fn frame(&self, frame: u64) -> PathBuf {
         if self.frames == 1 {
             return self.out.clone();

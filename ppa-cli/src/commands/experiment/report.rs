@@ -1,4 +1,4 @@
-//! `ppa experiment report`: one page of all results.
+//! `ppa experiment report`: all results on one page.
 
 use std::path::PathBuf;
 
@@ -21,9 +21,9 @@ use super::run::tested;
 use crate::output::Output;
 use crate::output_files::ReplaceArgs;
 
-/// Poses with the largest errors that are shown of an experiment, one of each limb.
+/// Number of poses with the largest errors shown per experiment, one of each limb.
 const WORST: usize = 6;
-/// Pixels along a side of their pictures.
+/// Side of their pictures in pixels.
 const WORST_SIDE: usize = 96;
 
 #[derive(Debug, Args)]
@@ -43,7 +43,7 @@ pub struct ReportArgs {
 #[derive(Debug, Serialize)]
 struct Outcome {
     page: PathBuf,
-    /// What each experiment shows, in sentences.
+    /// Findings of each experiment as sentences.
     findings: Vec<Finding>,
 }
 
@@ -143,7 +143,7 @@ fn row((metric, cells): (&'static str, Vec<TableCell>)) -> (String, Vec<ResultCe
     (metric.to_owned(), cells.into_iter().map(cell).collect())
 }
 
-/// Predictions of the best column against labels, and errors of all columns by angle where angles are known.
+/// Charts of the best column's predictions against labels, and of all columns' errors by angle if angles are known.
 fn charts(
     results: &Results,
     best: Option<Configuration>,
@@ -174,7 +174,7 @@ fn charts(
     charts
 }
 
-/// Errors of a learning curve's columns against the amount of data, and of the baselines, which have all of it.
+/// Chart of a learning curve: errors of its columns against the amount of data, and of the baselines, which use all data.
 fn learning_curve(results: &Results) -> Option<(String, ppa_report::Chart)> {
     let (label, caption) = match results.experiment() {
         Experiment::Persons => (
@@ -201,7 +201,7 @@ fn learning_curve(results: &Results) -> Option<(String, ppa_report::Chart)> {
     let [first, .., last] = network[..] else {
         return None;
     };
-    // The error of a constant would squeeze the others.
+    // The error of a constant prediction would compress the scale.
     let kinds = results.baselines().into_iter();
     let kinds = kinds.filter(|&kind| kind != BaselineKind::Constant);
     let baselines = kinds.filter_map(|kind| {

@@ -1,4 +1,4 @@
-//! `ppa experiment 1` to `2c` and `all`: trainings and tables of the paper's experiments.
+//! `ppa experiment 1` to `2c` and `all`: training runs and tables of the paper's experiments.
 
 use std::path::{Path, PathBuf};
 
@@ -78,22 +78,22 @@ pub struct RunArgs {
     replace: ReplaceArgs,
 }
 
-/// Endings of the tables of an experiment.
+/// File extensions of the tables of an experiment.
 const TABLES: [&str; 4] = ["md", "csv", "tex", "json"];
 
 #[derive(Debug, Serialize)]
 struct Outcome {
     experiment: &'static str,
-    /// Test sets on which the network answers with a constant.
+    /// Test sets on which the network predicts a constant.
     constant_prediction: Vec<ConstantTestSet>,
     finished: bool,
     missing: usize,
-    /// Trainings that are begun and not finished.
+    /// Training runs that are started but not finished.
     begun: Vec<Begun>,
     permutation_test: Option<PermutationTest>,
-    /// Each column beside predictions without a network.
+    /// Each column compared with predictions without a network.
     comparisons: Vec<Comparison>,
-    /// Columns beside the first one, where each alters one thing.
+    /// Columns compared with the first one, from which each differs in one thing.
     differences: Vec<Difference>,
     table: Option<String>,
 }
@@ -139,7 +139,7 @@ pub fn run_all(args: &RunArgs, output: Output) -> anyhow::Result<()> {
     stopped.map_or(Ok(()), Err)
 }
 
-/// Looks at the data of all experiments, then carries out one after the other; the error that says so if they were stopped.
+/// Checks the data of all experiments, then runs one after the other; returns the error to report if they were stopped.
 fn carry_out_all(
     plan: &ExperimentPlan,
     experiments: &[Experiment],
@@ -152,7 +152,7 @@ fn carry_out_all(
     let mut datasets: Vec<&Path> = targets.iter().map(|target| &*target.dataset).collect();
     datasets.insert(0, &plan.synthetic.dataset);
     repeat_of_datasets(datasets.into_iter())?;
-    // A whole path: begun trainings compare the paths of the weights that they began with.
+    // An absolute path: unfinished training runs compare the paths of the weights that they started from.
     let out = std::path::absolute(&args.out)?;
     let part = shard(args.shard)?.part(|| Ok(None))?;
     let left_out = |e: &Experiment| plan.configurations(*e).len() < e.configurations().len();
@@ -179,13 +179,13 @@ fn carry_out_all(
     Ok((outcomes, None))
 }
 
-/// An experiment whose data can be used.
+/// An experiment whose data have been checked.
 struct Prepared<'a> {
     experiment: Experiment,
     runner: Runner<'a>,
-    /// Numbers of the runs of the chosen columns.
+    /// Indices of the runs of the chosen columns.
     chosen: Vec<usize>,
-    /// Whether all of it is made here.
+    /// Whether this process makes all of it.
     whole: bool,
     tables: [PathBuf; 4],
 }
@@ -221,7 +221,7 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Carries out the trainings of an experiment and writes its tables.
+/// Runs the trainings of an experiment and writes its tables.
 fn carry_out(
     prepared: &Prepared,
     part: Part,
@@ -249,7 +249,7 @@ fn carry_out(
         ),
         (false, false) => None,
     };
-    // So far there may be no seed yet that is complete in both columns.
+    // There may be no seed yet that is complete in both columns.
     let permutation_test = match (&table, results.permutation_test()) {
         (Some(_), Some(test)) if args.so_far => test.ok(),
         (Some(_), Some(test)) => Some(test?),
@@ -284,7 +284,7 @@ fn carry_out(
     Ok(outcome)
 }
 
-/// Refuses tables that are there before they would be replaced after the trainings.
+/// Refuses existing tables now rather than after training.
 fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result<()> {
     let there = tables.iter().find(|path| path.exists());
     match there {
@@ -296,7 +296,7 @@ fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result
     }
 }
 
-/// Numbers of the runs of the named columns; all of them if none is named.
+/// Indices of the runs of the named columns; all of them if none is named.
 fn chosen(
     runner: &Runner,
     columns: &[Configuration],
@@ -322,7 +322,7 @@ fn chosen(
         .collect())
 }
 
-/// Carries out a share of the chosen runs; whether it came to their end.
+/// Runs a share of the chosen runs; returns whether they finished.
 fn train(
     runner: &Runner,
     chosen: &[usize],
@@ -379,7 +379,7 @@ fn describe(outcome: &Outcome) -> String {
     lines.join("\n")
 }
 
-/// The result of the paper's test in a sentence.
+/// Describes the result of the paper's test in a sentence.
 pub(super) fn tested(test: &PermutationTest) -> String {
     format!(
         "MAE from scratch minus pretrained over {}: {:.3}, exact one-sided p = {:.4} ({})",

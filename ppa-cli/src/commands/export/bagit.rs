@@ -1,4 +1,4 @@
-//! `ppa export bagit`: a dataset as a bag.
+//! `ppa export bagit`: a dataset as a BagIt bag.
 
 use std::path::PathBuf;
 

@@ -96,7 +96,7 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
         compute_labels(&manifest, limb, &bones, &thresholds, args.name.as_ref())
             .with_context(|| format!("cannot label by {}", planned.file.display()))
     });
-    // All limbs or none: an error in a later one leaves the earlier ones as they were.
+    // All limbs or none: an error in a later limb leaves the files of earlier ones unchanged.
     let computed = limbs.collect::<anyhow::Result<Vec<_>>>()?;
     if !args.replace.is_given() {
         computed.iter().try_for_each(ComputedLabels::require_same)?;

@@ -119,7 +119,7 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn beside(folder: &Path) -> PathBuf {
-    // `out/` and `out` are one folder.
+    // `out/` and `out` are the same folder.
     let mut name = folder.components().as_path().as_os_str().to_owned();
     name.push(".key.csv");
     name.into()
@@ -139,7 +139,7 @@ fn pages(folder: &Path, pictures: usize) -> Vec<PathBuf> {
 mod tests {
     use super::*;
 
-    /// As many as the paper's dataset has radiographs and repeats.
+    /// With as many pictures as the paper's dataset has radiographs and repeats.
     #[test]
     fn many_pictures_are_parted_into_pages() {
         let names = |pictures| pages(Path::new("out"), pictures);

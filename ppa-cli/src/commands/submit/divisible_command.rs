@@ -1,4 +1,4 @@
-//! A command line of `ppa xray` whose histories are divided.
+//! A command line of `ppa xray` whose histories can be divided.
 
 use anyhow::{anyhow, ensure};
 use clap::Parser;
@@ -7,7 +7,7 @@ use ppa_cluster::{HistoryCommand, HistoryCost};
 use crate::commands::xray::{Divisible, McgpuArgs, SimulateArgs, XrayCommand};
 use crate::stderr::in_one_line;
 
-/// A command of `ppa xray` that follows histories.
+/// A command of `ppa xray` that simulates histories.
 pub enum DivisibleCommand {
     Simulate(Box<SimulateArgs>),
     Mcgpu(McgpuArgs),
@@ -44,7 +44,7 @@ impl DivisibleCommand {
         }
     }
 
-    /// Which command it is.
+    /// Kind of the command.
     pub fn kind(&self) -> HistoryCommand {
         match self {
             Self::Simulate(_) => HistoryCommand::Simulate,
@@ -52,7 +52,7 @@ impl DivisibleCommand {
         }
     }
 
-    /// Its options that concern outputs only: those with a value, and those without.
+    /// Its options for outputs: those with a value, and those without.
     pub fn output_options(&self) -> (&'static [&'static str], &'static [&'static str]) {
         match self {
             Self::Simulate(_) => (
@@ -78,7 +78,7 @@ impl DivisibleCommand {
         }
     }
 
-    /// Refuses outputs that could not be written in the end.
+    /// Refuses outputs that could not be written at the end.
     pub fn check_outputs(&self) -> anyhow::Result<()> {
         match self {
             Self::Simulate(args) => args.check_outputs(),
@@ -86,7 +86,7 @@ impl DivisibleCommand {
         }
     }
 
-    /// Processor time of its histories, measured on some.
+    /// Processor time per history, measured on some.
     pub fn cost(&self) -> anyhow::Result<HistoryCost> {
         match self {
             Self::Simulate(args) => args.cost(),

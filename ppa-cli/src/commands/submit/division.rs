@@ -18,10 +18,10 @@ use super::histories::HistoriesInput;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::working;
 
-/// Shortest time limit of a training, seconds: each start reads all images, and Slurm sends TERM three minutes before the limit.
+/// Shortest time limit of a training run, seconds: each start reads all images, and Slurm sends TERM three minutes before the limit.
 const SHORTEST_S: u64 = 10 * 60;
 
-/// A plan of poses or of experiments, with the path of its file, or a command that follows histories.
+/// A plan of poses or of experiments, with the path of its file, or a command that simulates histories.
 pub enum Input {
     Poses(PathBuf, Box<Plan>),
     Experiments(PathBuf, Box<ExperimentPlan>),
@@ -41,7 +41,7 @@ impl Input {
     }
 }
 
-/// The submission of a plan or command, as it was divided before or is divided now; writes a plan into the folder.
+/// Makes the submission of a plan or command, with the recorded division if there is one; writes a plan to the folder.
 pub fn submission(
     args: &SlurmArgs,
     input: &Input,
@@ -49,7 +49,7 @@ pub fn submission(
     recorded: Option<Submission>,
 ) -> anyhow::Result<Submission> {
     let settings = settings(args, recorded.as_ref().map(|recorded| &recorded.settings));
-    // Beside its place, since a plan names cases from there.
+    // Next to its destination, since a plan names cases relative to it.
     let copy = folder.slurm().join(".new.plan.toml");
     let path = match input {
         Input::Poses(path, plan) => {
@@ -80,7 +80,7 @@ pub fn submission(
         Ok(made)
     });
     if placed.is_err() {
-        // What failed first is what counts.
+        // The first error is the one to report.
         let _ = remove_if_there(&copy);
     }
     placed
@@ -89,7 +89,7 @@ pub fn submission(
 /// The file that must not change between tasks.
 struct Source<'a> {
     path: &'a Path,
-    /// Of the copy of a plan, or of the file itself.
+    /// Hash of the copy of a plan, or of the file itself.
     sha256: String,
 }
 
@@ -182,12 +182,12 @@ fn divided(
         }
     };
     let mut first = Submission::new(path.to_owned(), sha256, work, settings);
-    // Scripts of a dry run are known as such.
+    // The scripts of a dry run are known as such.
     first.scripts = known.map(|known| known.scripts).unwrap_or_default();
     Ok(first)
 }
 
-/// A plan in shards, by the time of a pose as it is given, known from a dry run, or measured.
+/// Divides a plan into shards by the time of a pose: given, known from a dry run, or measured.
 fn poses(
     args: &SlurmArgs,
     plan: &Plan,
@@ -222,7 +222,7 @@ fn poses(
     })
 }
 
-/// Refuses a time limit within which a task could hardly begin to train.
+/// Refuses a time limit that hardly leaves time to train.
 fn check_time(settings: &TaskSettings) -> anyhow::Result<()> {
     ensure!(
         settings.time.seconds() >= SHORTEST_S,
@@ -233,7 +233,7 @@ fn check_time(settings: &TaskSettings) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The trainings of the chosen experiments of a plan, all of them if none is chosen, after a look at their data.
+/// The training runs of the chosen experiments of a plan, or of all if none is chosen, after checking their data.
 fn trainings(
     plan: &ExperimentPlan,
     chosen: &[Experiment],
@@ -267,7 +267,7 @@ fn trainings(
     Ok(work)
 }
 
-/// Options as given, else as before, else their defaults.
+/// Options as given, otherwise as before, otherwise their defaults.
 fn settings(args: &SlurmArgs, before: Option<&TaskSettings>) -> TaskSettings {
     let or_before = |given: &Option<String>, of: fn(&TaskSettings) -> &Option<String>| {
         given.clone().or_else(|| before.and_then(|s| of(s).clone()))
@@ -293,7 +293,7 @@ fn settings(args: &SlurmArgs, before: Option<&TaskSettings>) -> TaskSettings {
     }
 }
 
-/// The time of a pose in the middle of the sweep of the first limb.
+/// Measures the time of a pose in the middle of the sweep of the first limb.
 fn measured(plan: &Plan, folder: &ClusterFolder) -> anyhow::Result<PoseCost> {
     let mut one = plan.clone();
     one.cases.truncate(1);

@@ -15,7 +15,7 @@ use crate::commands::xray::Divisible;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::working;
 
-/// A command that follows histories, checked.
+/// A checked command that simulates histories.
 pub struct HistoriesInput {
     /// Absolute path of its case or input file.
     pub input: PathBuf,
@@ -24,7 +24,7 @@ pub struct HistoriesInput {
 }
 
 impl HistoriesInput {
-    /// Parses the words of a command line after `ppa`, and reads what they name.
+    /// Parses the words of a command line after `ppa`, and reads the files that they name.
     pub fn read(all_words: &[String], program_sha256: &str) -> anyhow::Result<Self> {
         let arguments = DivisibleCommand::parse(all_words)?;
         let (words, outputs) = without_outputs(all_words, arguments.output_options());
@@ -49,7 +49,7 @@ impl HistoriesInput {
         })
     }
 
-    /// The division into parts: as given, known from a dry run, or by the time of histories that are followed now.
+    /// Divides the histories into parts: as given, as known from a dry run, or by timing some histories now.
     pub fn divided(
         &self,
         tasks: Option<NonZeroU64>,
@@ -94,7 +94,7 @@ impl HistoriesInput {
         Ok(cost)
     }
 
-    /// Refuses another command than the one that was submitted, and what would make parts that do not fit together.
+    /// Refuses a command other than the submitted one, and changes that would make parts incompatible.
     pub fn check_same(
         &self,
         submitted: &HistoryWork,
@@ -129,7 +129,7 @@ impl HistoriesInput {
         Ok(())
     }
 
-    /// Whether the words and what they ask for are the same; folder and program may differ.
+    /// Whether the words and the work they describe are the same; folder and program may differ.
     fn is_same_command(&self, other: &HistoryWork) -> bool {
         let (own, other) = (&self.divided, &other.divided);
         (&own.words, &own.outputs) == (&other.words, &other.outputs)
@@ -137,7 +137,7 @@ impl HistoriesInput {
     }
 }
 
-/// The first damaged tally of a part, as a sentence; damaged tallies are renamed if `rename` is set, since their task would resume them.
+/// Describes the first damaged tally of a part; with `rename`, damaged tallies are renamed, since their task would resume them.
 pub fn damaged_tally(part: &Path, rename: bool) -> anyhow::Result<Option<String>> {
     let mut first = None;
     for tally in tallies(part) {
@@ -161,7 +161,7 @@ pub fn damaged_tally(part: &Path, rename: bool) -> anyhow::Result<Option<String>
     Ok(first)
 }
 
-/// Words of a command line without those that name outputs, and these; options are given with and without a value.
+/// Splits a command line into words that do not name outputs and words that do; `options` have a value, flags do not.
 fn without_outputs(
     words: &[String],
     (options, flags): (&[&str], &[&str]),

@@ -45,7 +45,7 @@ pub fn run(args: &AuditArgs, output: Output) -> anyhow::Result<()> {
     output.print(&audit, describe)
 }
 
-/// Most characters of a row of bars.
+/// Largest number of characters in a row of bars.
 const WIDTH: usize = 40;
 
 fn describe(audit: &Audit) -> String {
@@ -111,7 +111,7 @@ fn describe(audit: &Audit) -> String {
     text
 }
 
-/// Rows of bars, one character for the same number of neighbouring bins everywhere, its height logarithmic.
+/// Histograms as rows of bars; each character covers the same number of bins in all rows, with logarithmic height.
 struct HistogramRows {
     bin_hu: f32,
     hu_per_bar: f32,
@@ -129,7 +129,7 @@ impl HistogramRows {
                 [first, .., last] => last.from_hu - first.from_hu + bin_hu,
                 [_] => bin_hu,
             });
-        // A row whose first bin does not begin a bar needs one bar more.
+        // A row whose first bin is not at the start of a bar needs one bar more.
         let bins_per_bar = (widths.fold(0.0, f32::max) / bin_hu / (WIDTH - 1) as f32).ceil();
         let mut histogram = Self {
             bin_hu,
@@ -148,7 +148,7 @@ impl HistogramRows {
         format!("voxels per {} HU, logarithmic", self.hu_per_bar)
     }
 
-    /// Voxels of each bar from the first to the last that has any.
+    /// Number of voxels in each bar from the first to the last non-empty one.
     fn sums(&self, bins: &[HuBin]) -> Vec<usize> {
         let bar = |bin: &HuBin| ((bin.from_hu + 0.5 * self.bin_hu) / self.hu_per_bar).floor();
         let Some(first) = bins.first().map(bar) else {
@@ -182,7 +182,7 @@ mod tests {
 
     use super::*;
 
-    /// A limb is spoken of where one was cut out, not of a bare scan.
+    /// Messages mention a limb only if one was cut out, not for a bare scan.
     #[test]
     fn voxels_outside_a_limb_are_reported_only_of_a_limb() {
         let grid = Grid::axis_aligned([3, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();
@@ -194,7 +194,7 @@ mod tests {
         assert!(limb.contains(", 1 voxel outside the limb"), "{limb}");
     }
 
-    /// Two neighbouring bins to a bar, an empty bar between, the fullest bar the highest, every voxel seen.
+    /// Two neighbouring bins per bar, an empty bar between, the fullest bar the highest, every voxel counted.
     #[test]
     fn bars_stand_for_neighbouring_bins() {
         let bin = |from_hu, voxels| HuBin { from_hu, voxels };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How long histories are followed to measure their time.
+/// How long histories are simulated to measure their time.
 pub(super) const MEASURE: Duration = Duration::from_secs(3);
 
 /// The histories of a command.
@@ -12,11 +12,11 @@ pub struct Divisible {
     pub input: PathBuf,
     /// Histories of each projection.
     pub histories: u64,
-    /// Projections; 1 of a radiograph.
+    /// Number of projections; 1 for a radiograph.
     pub projections: u64,
 }
 
-/// Refuses the first option that is given though `ppa submit` gives it to tasks, or it depends on all histories.
+/// Refuses the first given option that `ppa submit` sets for tasks, or that depends on all histories.
 pub(super) fn refuse_given(options: &[(&str, bool)]) -> anyhow::Result<()> {
     match options.iter().find(|(_, given)| *given) {
         Some((option, _)) => anyhow::bail!(

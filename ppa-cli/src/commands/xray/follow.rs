@@ -1,4 +1,4 @@
-//! Runs of the analog engine: stopping rule, part, doses.
+//! Runs of the analog engine: stopping rule, parts, doses.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::interrupt::Interrupt;
 use crate::output::bar;
 use crate::output_files::{OutputFiles, ReplaceArgs, require_room};
 
-/// Time between two saved states of a run, at most what an interruption costs.
+/// Time between two saved states of a run, the most that an interruption can lose.
 pub(super) const SAVE_EVERY: Duration = Duration::from_secs(60);
 
 #[derive(Debug, Args)]
@@ -46,10 +46,10 @@ pub struct AnalogArgs {
     pub dose_map: Option<PathBuf>,
 }
 
-/// Where the sums of a run are kept.
+/// Where the tallies of a run are stored.
 pub struct TallyDestination {
     path: PathBuf,
-    /// Asked for by `--tally`; else they are kept only if the run is stopped.
+    /// Set by `--tally`; otherwise the tallies are kept only if the run is stopped.
     named: bool,
 }
 
@@ -63,7 +63,7 @@ impl TallyDestination {
 }
 
 impl AnalogArgs {
-    /// Declares tally and dose map, and says where the sums are kept if the run is stopped; `image` is the first of its images.
+    /// Declares tally and dose map, and chooses where the tallies are kept if the run is stopped; `image` is its first image.
     pub fn declare(
         &self,
         outputs: &mut OutputFiles,
@@ -106,12 +106,12 @@ impl AnalogArgs {
         Ok(TallyDestination { path, named: false })
     }
 
-    /// Whether there is an earlier run to resume.
+    /// Whether an earlier run is resumed.
     pub fn goes_on(&self) -> bool {
         self.resume && self.tally.as_ref().is_some_and(|tally| tally.exists())
     }
 
-    /// The first option that only the analog engine knows.
+    /// The first given option that only the analog engine supports.
     pub fn given(&self) -> Option<&'static str> {
         let options = [
             (self.time.is_some(), "--time"),
@@ -128,7 +128,7 @@ impl AnalogArgs {
             .map(|(_, name)| name)
     }
 
-    /// Refuses options that a command whose histories are divided cannot have.
+    /// Refuses options that are not allowed for a command whose histories are divided.
     pub fn check_divisible(&self) -> anyhow::Result<()> {
         refuse_given(&[
             ("--time", self.time.is_some()),
@@ -139,7 +139,7 @@ impl AnalogArgs {
         ])
     }
 
-    /// Histories to follow at most, of those that `--histories` asks for.
+    /// Largest number of histories to simulate; `given` is the value of `--histories`.
     pub fn histories(&self, given: Option<f64>) -> anyhow::Result<u64> {
         match given {
             Some(histories) => whole_number(histories),
@@ -148,7 +148,7 @@ impl AnalogArgs {
         }
     }
 
-    /// The run of an exposure, with the doses that are asked for.
+    /// The run of an exposure, with the requested doses.
     pub fn run<'a>(
         &self,
         exposure: &'a PosedExposure,
@@ -171,7 +171,7 @@ impl AnalogArgs {
         Ok(run.with_dose(&DoseSettings::default().with_voxels(voxels))?)
     }
 
-    /// Follows photons under a progress bar. Ctrl-C and TERM keep what was counted and end the command.
+    /// Simulates photons with a progress bar. Ctrl-C and TERM keep the tallies and end the command.
     pub fn follow(
         &self,
         exposure: &PosedExposure,
@@ -225,7 +225,7 @@ impl AnalogArgs {
         Ok(tally)
     }
 
-    /// The tally to begin with.
+    /// The tally to start from.
     fn start(
         &self,
         run: &AnalogRun,
@@ -239,7 +239,7 @@ impl AnalogArgs {
         let tally = run.tally(part);
         require_room(destination.folder(), tally.file_bytes())?;
         if destination.named && !there {
-            // What cannot be written is found now rather than after hours.
+            // Finds out now rather than after hours whether it can be written.
             tally.write(&destination.path)?;
         }
         Ok(tally)

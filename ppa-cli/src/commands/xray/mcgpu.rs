@@ -1,4 +1,4 @@
-//! `ppa xray mcgpu`: runs an input file of MC-GPU v1.3 as it is.
+//! `ppa xray mcgpu`: runs an unchanged input file of MC-GPU v1.3.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -49,13 +49,13 @@ pub struct McgpuArgs {
     replace: ReplaceArgs,
 }
 
-/// Five numbers in the raw image, and at least four digits with their spaces as text.
+/// Smallest size of a pixel: five numbers in the raw image, and at least four digits with their spaces as text.
 const LEAST_PIXEL_BYTES: u64 = 5 * 4 + 8;
 
 #[derive(Debug, Serialize)]
 struct Simulated {
     projections: Vec<Projected>,
-    /// Of each projection; the fewest, if a time limits them.
+    /// Histories of each projection; the smallest number, if a time limits them.
     histories: f64,
     engine: Engine,
     #[serde(flatten)]
@@ -66,7 +66,7 @@ struct Simulated {
 
 #[derive(Debug, Serialize)]
 struct Projected {
-    /// In the whole scan, from 0.
+    /// Index of the projection in the complete scan, from 0.
     number: u32,
     angle_deg: f64,
     #[serde(flatten)]
@@ -75,7 +75,7 @@ struct Projected {
     image: PathBuf,
 }
 
-/// By line of the material list, per history of all projections.
+/// Dose by line of the material list, per history of all projections.
 #[derive(Debug, Serialize)]
 struct MaterialDose {
     material_dose_ev_per_history: Vec<f64>,
@@ -111,7 +111,7 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
         .simulate(&simulation, &stations, scan, &written, &working, &interrupt)
         .and_then(|scan| args.finish(&simulation, &stations, scan));
     if scanned.is_err() && is_new {
-        // Goes only if nothing is in it.
+        // Removed only if it is empty.
         let _ = fs::remove_dir(&args.out);
     }
     let (projections, dose) = scanned?;
@@ -128,7 +128,7 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
 }
 
 impl McgpuArgs {
-    /// The scan that was interrupted in the folder, or a new one.
+    /// The interrupted scan in the folder, or a new one.
     fn start<'a>(&self, simulation: &'a Simulation, length: RunLength) -> anyhow::Result<Scan<'a>> {
         let scan = Scan::new(simulation, length, self.engine(), &self.out);
         let path = scan.tally_path();
@@ -144,7 +144,7 @@ impl McgpuArgs {
         }
     }
 
-    /// Simulates the projections that `scan` lacks, and complete ones whose images are not among the files `written`.
+    /// Simulates the projections that `scan` lacks, and finished ones whose images are not among the files `written`.
     fn simulate<'a>(
         &self,
         simulation: &Simulation,
@@ -200,7 +200,7 @@ impl McgpuArgs {
         Ok(scan)
     }
 
-    /// Writes the doses that the file asks for and ends the scan.
+    /// Writes the doses that the file asks for and finishes the scan.
     fn finish(
         &self,
         simulation: &Simulation,
@@ -221,7 +221,7 @@ impl McgpuArgs {
         Ok((projections, scan.finish()?))
     }
 
-    /// Declares all files of the scan that are not `written`.
+    /// Declares all files of the scan except those `written`.
     fn declare(
         &self,
         simulation: &Simulation,
@@ -247,7 +247,7 @@ impl McgpuArgs {
         require_room(&self.out, LEAST_PIXEL_BYTES * pixels * missing as u64)
     }
 
-    /// The histories of this command, to be divided.
+    /// The histories of this command, for division into tasks.
     pub fn divisible(&self) -> anyhow::Result<Divisible> {
         refuse_given(&[
             ("--part", self.part.is_some()),
@@ -263,7 +263,7 @@ impl McgpuArgs {
         })
     }
 
-    /// Refuses outputs that could not be written in the end.
+    /// Refuses outputs that could not be written at the end.
     pub fn check_outputs(&self) -> anyhow::Result<()> {
         let simulation = self.read()?;
         let length = self.length(simulation.input().run_length)?;
@@ -272,7 +272,7 @@ impl McgpuArgs {
         self.declare(&simulation, &stations, &scan, &scan.written())
     }
 
-    /// Processor time of its histories, measured on some of the first projection.
+    /// Processor time per history, measured on some of the first projection.
     pub fn cost(&self) -> anyhow::Result<HistoryCost> {
         let watch = Stopwatch::start();
         let simulation = self.read()?;
@@ -288,7 +288,7 @@ impl McgpuArgs {
         })
     }
 
-    /// Reads the input file and all that it names; it has a projection.
+    /// Reads the input file and all files that it names; checks that it has a projection.
     fn read(&self) -> anyhow::Result<Simulation> {
         let mut simulation = Simulation::read(&self.input)?;
         if let Some(seed) = self.seed {
@@ -320,7 +320,7 @@ impl McgpuArgs {
         Ok(RunLength::Histories(histories as u64))
     }
 
-    /// The histories of each projection for an option that needs their number, and the analog engine.
+    /// Histories of each projection for an option that needs their number and the analog engine.
     fn histories(&self, length: RunLength, option: &str) -> anyhow::Result<u64> {
         anyhow::ensure!(
             matches!(self.engine, EngineName::Analog),

@@ -16,14 +16,14 @@ use crate::output_files::require_room;
 #[derive(Debug, Serialize)]
 struct Followed {
     part: String,
-    /// Of each projection, in this part.
+    /// Histories of each projection in this part.
     histories: u64,
     tallies: Vec<PathBuf>,
     #[serde(flatten)]
     seconds: Seconds,
 }
 
-/// Follows the histories of a part into its tallies; those that are there continue.
+/// Simulates the histories of a part into its tallies; existing tallies are continued.
 pub fn follow_part(
     simulation: &Simulation,
     scan_part: &ScanPart,

@@ -1,4 +1,4 @@
-//! `ppa xray merge`: the parts of a run as one radiograph.
+//! `ppa xray merge`: joins the parts of a run to one radiograph.
 
 use std::path::{Path, PathBuf};
 

@@ -40,7 +40,7 @@ fn protocol(name: &str) -> Result<Presentation, String> {
     Presentation::protocol(name).map_err(|error| error.to_string())
 }
 
-/// Beyond this medial rotation a frontal view is an oblique one, and from there on a lateral one, degrees.
+/// Medial rotation from which a frontal view is called oblique, and from which it is called lateral, degrees.
 const OBLIQUE_FROM_DEG: f64 = 7.5;
 const LATERAL_FROM_DEG: f64 = 67.5;
 
@@ -58,7 +58,7 @@ impl PictureArgs {
         })
     }
 
-    /// The exposure index aimed at: the one given, or that of automatic exposure control.
+    /// The target exposure index: the one given, or that of automatic exposure control.
     pub fn target_exposure_index(&self, settings: &XraySettings) -> Option<f64> {
         let controlled = match settings.tube_load {
             Some(TubeLoad::ExposureIndex(index)) => Some(index),
@@ -72,7 +72,7 @@ impl PictureArgs {
         let Some(path) = &self.dicom else {
             return Ok(());
         };
-        // DICOM files often have no ending at all.
+        // DICOM files often have no extension.
         let endings: &[&str] = match path.extension() {
             Some(_) => &[".dcm", ".dicom"],
             None => &[],
@@ -108,7 +108,7 @@ impl PictureArgs {
     }
 }
 
-/// The beam comes from above: from the front at rest, and from the side that medial rotation turns up.
+/// The beam comes from above: from the front at rest, and from the side that medial rotation turns upwards.
 fn examination(case: &Case, limb: LimbKind, angle_deg: f64) -> Examination {
     let view = match angle_deg {
         angle if angle >= LATERAL_FROM_DEG => View::LateroMedial,

@@ -29,15 +29,15 @@ pub struct Report {
 struct Projected {
     #[serde(flatten)]
     sums: CategorySums,
-    /// Photons into the field per mAs; null when the fluence of the spectrum is unknown, as what follows.
+    /// Photons into the field per mAs; null if the fluence of the spectrum is unknown, as are the fields below.
     histories_per_mas: Option<f64>,
-    /// Tube load whose quantum noise the image carries.
+    /// Tube load that corresponds to the quantum noise of the image.
     mas: Option<f64>,
     ev_per_mas: Option<BTreeMap<&'static str, f64>>,
     open_field_ev_cm2_per_mas: Option<f64>,
 }
 
-/// By IEC 62494-1; null where it is not known.
+/// Indices of IEC 62494-1; null if unknown.
 #[derive(Debug, Default, Serialize)]
 struct ExposureReport {
     exposure_index: Option<f64>,
@@ -45,7 +45,7 @@ struct ExposureReport {
     deviation_index: Option<f64>,
 }
 
-/// Material by material, in one order.
+/// Doses of the materials, all in the same order.
 #[derive(Debug, Serialize)]
 struct DoseReport {
     materials: Vec<String>,
@@ -58,12 +58,12 @@ struct DoseReport {
     detector_air_kerma_ugy_per_mas: Option<f64>,
 }
 
-/// Incident air kerma at the skin; null where the central ray meets no patient, or it is not known.
+/// Incident air kerma at the skin; null if the central ray misses the patient or it is unknown.
 #[derive(Debug, Default, Serialize)]
 struct EntranceReport {
     entrance_air_kerma_gy_per_history: Option<f64>,
     entrance_air_kerma_ugy_per_mas: Option<f64>,
-    /// Of the tube load whose quantum noise the image carries.
+    /// For the tube load that corresponds to the quantum noise of the image.
     entrance_air_kerma_ugy: Option<f64>,
 }
 
@@ -126,7 +126,7 @@ impl Report {
         self
     }
 
-    /// In words; `written` names the files.
+    /// Describes the report; `written` are the output files.
     pub fn describe(&self, written: &[&Path]) -> String {
         let projected = &self.projections[0];
         let mut text = "eV per history on the detector\n".to_owned();

@@ -83,14 +83,14 @@ struct Simulated {
 }
 
 impl SimulateArgs {
-    /// Declares all outputs, and says where the histories of the analog engine are kept.
+    /// Declares all outputs, and chooses where the histories of the analog engine are kept.
     fn declare(&self) -> anyhow::Result<Option<TallyDestination>> {
         if matches!(self.engine, EngineName::Fast)
             && let Some(option) = self.analog.given()
         {
             anyhow::bail!("{option} needs --engine analog");
         }
-        // A resumed run replaces the images of the one before.
+        // A resumed run replaces the images of the previous one.
         let mut outputs = self.replace.or(self.analog.goes_on()).outputs();
         outputs.optional("--out", self.out.as_ref(), &[".png"])?;
         outputs.optional("--exr", self.exr.as_ref(), &[".exr"])?;
@@ -103,7 +103,7 @@ impl SimulateArgs {
         })
     }
 
-    /// The plan with what the command line changes.
+    /// The plan with the changes of the command line.
     fn plan(&self) -> anyhow::Result<Plan> {
         let mut plan = match &self.plan {
             Some(path) => Plan::read(path)?,
@@ -136,7 +136,7 @@ impl SimulateArgs {
         Ok(ExposableLimb::new(prepared, plan, table, spectrum)?)
     }
 
-    /// The histories of this command, to be divided.
+    /// The histories of this command, for division into tasks.
     pub fn divisible(&self) -> anyhow::Result<Divisible> {
         anyhow::ensure!(
             matches!(self.engine, EngineName::Analog),
@@ -152,12 +152,12 @@ impl SimulateArgs {
         })
     }
 
-    /// Refuses outputs that could not be written in the end.
+    /// Refuses outputs that could not be written at the end.
     pub fn check_outputs(&self) -> anyhow::Result<()> {
         self.declare().map(|_| ())
     }
 
-    /// Processor time of its histories, measured on some.
+    /// Processor time per history, measured on some.
     pub fn cost(&self) -> anyhow::Result<HistoryCost> {
         let watch = Stopwatch::start();
         let limb = self.limb(&Case::read(&self.case)?, &self.plan()?)?;

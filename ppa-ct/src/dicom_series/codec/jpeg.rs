@@ -6,10 +6,10 @@ use libjpeg_turbo_rs::{Decoder, JpegError, PixelFormat};
 use super::{CodecError, contain, expect_frame, expect_memory};
 use crate::dicom_series::header::Image;
 
-/// What the decoder holds of a pixel: coefficients and samples.
+/// Memory of the decoder per pixel: coefficients and samples.
 const BYTES_PER_PIXEL: usize = 12;
 
-/// What the start of a frame shows.
+/// Contents of the start-of-frame segment.
 struct Frame {
     lossless: bool,
     bits: u8,

@@ -9,7 +9,7 @@ use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image as Jp2};
 use super::{CodecError, contain, expect_frame, expect_grey, expect_memory};
 use crate::dicom_series::header::Image;
 
-/// What the decoder holds of a pixel: coefficients, their transform, samples, and bytes of its code-block.
+/// Memory of the decoder per pixel: coefficients, their transform, samples, and bytes of its code-block.
 const BYTES_PER_PIXEL: usize = 24;
 
 pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
@@ -20,7 +20,7 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
         strict: true,
         ..DecodeSettings::default()
     };
-    // Without the boxes: what they may say of colours is no matter of grey images.
+    // The boxes are ignored: their colour information does not matter for grey images.
     let stream = Jp2::new(codestream, &settings).map_err(|e| damaged(&e))?;
     let components = u32::from(stream.color_space().num_channels()) + u32::from(stream.has_alpha());
     let bits = u32::from(stream.original_bit_depth());
@@ -31,7 +31,7 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
     let decoded = stream.decode(&mut context).map_err(|e| damaged(&e))?;
     let components = decoded.components();
     expect_grey(components.len())?;
-    // The decoder hands out samples above the lowest possible one; f32 holds up to 24 bits exactly.
+    // The decoder returns samples relative to the lowest possible one; f32 holds up to 24 bits exactly.
     let (lowest, most) = (1_u32 << (bits - 1), (1_u64 << bits) as f32 - 1.0);
     let signed = is_signed(codestream);
     let sample = |&v: &f32| {
@@ -45,9 +45,9 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
     contain(components[0].samples().iter().map(sample), image)
 }
 
-/// Whether the codestream itself says that its samples are signed; headers are known to disagree (section A.5.1).
+/// Whether the codestream itself marks its samples as signed; headers are known to disagree (section A.5.1).
 fn is_signed(codestream: &[u8]) -> bool {
-    /// Depth of the first component.
+    /// Offset of the depth of the first component.
     const DEPTH_AT: usize = 42;
     codestream.get(DEPTH_AT).is_some_and(|d| d & 0x80 != 0)
 }
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::dicom_series::codec::FOUR_BY_FOUR;
 
-    /// A codestream of 4 x 4 pixels whose one tile is empty.
+    /// A codestream of 4 x 4 pixels with a single empty tile.
     fn stream(components: u8) -> Vec<u8> {
         let size = [[0, 0, 0, 4], [0; 4], [0, 0, 0, 4], [0; 4]].map(|v: [u8; 4]| [v, v].concat());
         let segment = |marker: u8, body: &[u8]| {

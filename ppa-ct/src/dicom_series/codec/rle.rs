@@ -1,6 +1,6 @@
 //! RLE lossless: byte planes packed with PackBits (DICOM PS3.5, annex G).
 
-/// A header of 16 numbers: how many segments, and where they start.
+/// Length of the header of 16 numbers: the number of segments and their offsets.
 const HEADER_BYTES: usize = 64;
 
 /// Unpacks one grey frame into little-endian `values` of `width` bytes; `None` if it is damaged.
@@ -26,7 +26,7 @@ pub(super) fn unpack(packed: &[u8], width: usize, values: &mut [u8]) -> Option<(
     Some(())
 }
 
-/// Fills all `places`; what follows in the segment is padding.
+/// Fills all `places`; the rest of the segment is padding.
 fn unpack_segment<'a>(
     segment: &[u8],
     mut places: impl ExactSizeIterator<Item = &'a mut u8>,
@@ -35,7 +35,7 @@ fn unpack_segment<'a>(
     while places.len() > 0 {
         let (&control, tail) = rest.split_first()?;
         match control.cast_signed() {
-            // A run of as-is bytes.
+            // A run of literal bytes.
             literal @ 0.. => {
                 let (bytes, tail) = tail.split_at_checked(literal as usize + 1)?;
                 for (place, byte) in places.by_ref().take(bytes.len()).zip(bytes) {
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Packs bytes in the given kinds of runs, with idle codes in between.
+    /// Packs bytes in the given kinds of runs, with no-op codes in between.
     fn pack(bytes: &[u8], runs: &[usize]) -> Vec<u8> {
         let (mut packed, mut rest) = (Vec::new(), bytes);
         for run in runs.iter().cycle() {

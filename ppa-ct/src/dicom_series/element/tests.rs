@@ -1,4 +1,4 @@
-//! Elements and items, whole and damaged.
+//! Parsing of complete and damaged elements and items.
 
 use super::*;
 use proptest::prelude::*;
@@ -59,7 +59,7 @@ fn nested(delimited: [bool; 2], texts: &[String]) -> Vec<u8> {
 }
 
 proptest! {
-    /// Both ways to end sequences and items give the same elements, and nothing short is taken.
+    /// Both ways to end sequences and items give the same elements, and truncated bytes are refused.
     #[test]
     fn items_are_found_and_cut_bytes_are_not_read(
         delimited in any::<[bool; 2]>(),
@@ -77,7 +77,7 @@ proptest! {
 
         let cut = cut.index(end);
         let parsed = DataSet::parse(&bytes[..cut], 0, Encoding::ExplicitLittle, pixels);
-        // Whole elements may remain; a cut one is short.
+        // Complete elements may remain; a cut one is too short.
         prop_assert!(cut == 0 || cut == 10 || parsed.unwrap_err() == Fault::Short);
     }
 
@@ -101,7 +101,7 @@ proptest! {
 #[test]
 fn endless_nesting_is_refused() {
     let opened = [element(SEQUENCE, b"UN", b"", true), item(b"", true)].concat();
-    // Without the delimiter of the sequence, before and behind which the item is.
+    // Without the delimiter of the sequence, with the item before and after it.
     let mut bytes = [&opened[..12], &opened[20..28]].concat();
     for _ in 0..100_000 {
         bytes.extend(b"\x40\0\0\x01\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff");

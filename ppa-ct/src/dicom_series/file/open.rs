@@ -14,11 +14,11 @@ use crate::error::ReadError;
 
 /// Preamble and `DICM` (PS3.10, section 7.1).
 const META_AT: usize = 132;
-/// Headers are a few kilobytes long; longer ones are read in further steps.
+/// Bytes read first: headers are a few kilobytes long; longer ones are read in further steps.
 const FIRST_BYTES: u64 = 1 << 16;
-/// Deflate packs at most 1032 bytes into one (zlib technical details), so this refuses no right file.
+/// Deflate packs at most 1032 bytes into one (zlib technical details), so no valid file is refused.
 const INFLATES_AT_MOST: u64 = 1032;
-/// Longest header that a deflated file is inflated for.
+/// Largest number of bytes inflated in search of a header's end.
 const LONGEST_DEFLATED: u64 = 1 << 26;
 
 /// A file with the bytes of its header.
@@ -46,7 +46,7 @@ pub(in crate::dicom_series) fn open(path: &Path) -> Result<Opened, ReadError> {
     if bytes.get(META_AT - 4..META_AT) != Some(b"DICM") {
         return Err(damaged(Fault::Damaged(0)));
     }
-    // The group is walked to its end: some writers leave a wrong group length, or titles longer than allowed.
+    // The group is read element by element: some writers leave a wrong group length, or titles longer than allowed.
     let (meta, data_set_at) =
         DataSet::parse(&bytes, META_AT, Encoding::ExplicitLittle, |tag| tag.0 != 2)
             .map_err(damaged)?;
@@ -95,7 +95,7 @@ pub(in crate::dicom_series) fn open(path: &Path) -> Result<Opened, ReadError> {
     let at = start.value_at as u64;
     let rest = length.saturating_sub(at);
     let pixels = start.length.map(|length| length as u64);
-    // How much a deflated file holds is seen only when its pixels are read; they are no fragments.
+    // The size of a deflated file is known only when its pixels are read; they are not fragments.
     let most = if deflated {
         length.saturating_mul(INFLATES_AT_MOST)
     } else {
@@ -118,7 +118,7 @@ pub(in crate::dicom_series) fn open(path: &Path) -> Result<Opened, ReadError> {
     Ok(opened)
 }
 
-/// Reads on until the start of the pixels is in `bytes`, or the stream ends without any: then `None`.
+/// Reads on until `bytes` contains the start of the pixels; returns `None` if the stream ends without any.
 fn find_pixels(
     stream: &mut dyn Read,
     bytes: &mut Vec<u8>,
@@ -128,7 +128,7 @@ fn find_pixels(
 ) -> std::io::Result<Result<Option<ElementHeader>, Fault>> {
     loop {
         let found = start_of_pixels(bytes, data_set_at, encoding);
-        // The end of the bytes may be an accidental border of elements.
+        // The end of the bytes may coincide with the end of an element.
         if !matches!(found, Ok(None) | Err(Fault::Short)) {
             return Ok(found);
         }
@@ -161,7 +161,7 @@ fn is_pixel_data(tag: Tag) -> bool {
 }
 
 impl Opened {
-    /// The elements in front of the pixels.
+    /// The elements before the pixels.
     pub fn data_set(&self) -> Result<DataSet<'_>, ReadError> {
         DataSet::parse(
             &self.bytes,
@@ -183,7 +183,7 @@ mod tests {
 
     use super::*;
 
-    /// Whatever length a file had when it was opened: reading ends where the bytes do.
+    /// Reading ends with the bytes, whatever length the file had when it was opened.
     #[test]
     fn the_search_for_pixels_ends_with_the_stream() {
         let element = b"\x10\0\x10\0PN\x04\0Doe ";
@@ -210,7 +210,7 @@ mod tests {
         std::fs::write(path, &file).unwrap();
     }
 
-    /// Of a deflated file no more is inflated than its header, and then the pixels that this speaks of.
+    /// Of a deflated file only the header is inflated, and later the pixels that it specifies.
     #[test]
     fn a_deflated_file_is_inflated_as_far_as_its_header_asks() {
         let folder = tempfile::tempdir().unwrap();

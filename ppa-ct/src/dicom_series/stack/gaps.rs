@@ -8,22 +8,22 @@ use super::steps::{OFF_LATTICE_MM, OFF_LATTICE_STEPS, steps};
 use crate::error::ReadError;
 use crate::scan::{Warning, WarningCode};
 
-/// Most slices of a filled stack for each slice that is there: beyond, a stack would be made up, not filled.
+/// Largest ratio of slices in a filled stack to slices found: above it, most of the stack would be interpolated.
 const MOST_PER_SLICE: usize = 8;
 
-/// A place between two slices of a stack.
+/// A position between two slices of a stack.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::dicom_series) struct Between {
-    /// The slice below, counted in order; the other is the next one.
+    /// The slice below, counted in order; the other is the next slice.
     pub below: usize,
-    /// Weight of the other, 0 to 1.
+    /// Weight of the other slice, 0 to 1.
     pub weight: f32,
 }
 
-/// An even lattice from the first to the last of uneven positions, and where its slices lie between those.
+/// Makes an even lattice from the first to the last of uneven positions, and places its slices between them.
 ///
 /// # Errors
-/// [`ReadError::TooManyGaps`] where that takes far more slices than there are.
+/// [`ReadError::TooManyGaps`] if that needs far more slices than exist.
 pub(super) fn fill(
     source: &Path,
     positions: &[Point3<f64>],
@@ -35,7 +35,7 @@ pub(super) fn fill(
     let usual_mm = steps(positions).1;
     let count = (whole.norm() / usual_mm).round().max(1.0);
     let most = MOST_PER_SLICE * positions.len();
-    // Written so that infinity is refused too.
+    // Written so that infinity is also refused.
     let few = count + 1.0 <= most as f64;
     if !few {
         return Err(ReadError::TooManyGaps {
@@ -54,7 +54,7 @@ pub(super) fn fill(
         }
         let [low, high] = [along[above - 1], along[above]];
         let weight = ((height - low) / (high - low)).clamp(0.0, 1.0);
-        // Rounded positions do not blur slices that are there.
+        // Rounded positions do not blur existing slices.
         let slack = OFF_LATTICE_MM.min(OFF_LATTICE_STEPS * usual_mm) / (high - low);
         let weight = if weight < slack {
             0.0
@@ -71,7 +71,7 @@ pub(super) fn fill(
     Ok((step, places.collect()))
 }
 
-/// What was made up.
+/// The warning about interpolated slices.
 pub(super) fn filled(found: usize, places: &[Between]) -> Warning {
     let made = places.iter().filter(|p| !matches!(p.weight, 0.0 | 1.0));
     Warning {

@@ -6,14 +6,14 @@ use nalgebra::{Point3, Vector3};
 
 use crate::error::{Gap, ReadError};
 
-/// Two slices closer than this lie in the same place.
+/// Distance below which two slices are at the same position.
 const SAME_PLACE_MM: f64 = 1e-3;
-/// How far a slice may lie from its place on the lattice: positions rounded to 0.1 mm pass.
+/// Largest distance of a slice from its place on the lattice: positions rounded to 0.1 mm pass.
 pub(super) const OFF_LATTICE_MM: f64 = 0.1;
 /// The same for small steps, as a fraction of the step; one missing slice moves others by 0.5.
 pub(super) const OFF_LATTICE_STEPS: f64 = 0.2;
 
-/// Refuses slices in the same place; `heights` are those of `positions` along the normal, rising.
+/// Refuses slices at the same position; `heights` are those of `positions` along the normal, ascending.
 pub(super) fn distinct_places(
     source: &Path,
     positions: &[Point3<f64>],
@@ -46,16 +46,16 @@ pub(super) fn distinct_places(
     })
 }
 
-/// How slices follow each other along a line.
+/// Steps between consecutive slices along a line.
 pub(super) enum Steps {
-    /// By the same step.
+    /// Equal steps.
     Even(Vector3<f64>),
-    /// By different steps, with the error that names them.
+    /// Different steps, with the error that names them.
     Uneven(ReadError),
 }
 
-/// The step from slice to slice, if every slice lies on the lattice that the ends span; slices beside the line
-/// between the ends are refused, since no lattice holds them.
+/// Returns the step between slices if every slice is on the lattice spanned by the first and last; refuses slices off the line
+/// between these, since no lattice contains them.
 pub(super) fn even_step(
     source: &Path,
     positions: &[Point3<f64>],
@@ -76,7 +76,7 @@ pub(super) fn even_step(
         .iter()
         .map(|s| (s - expected_mm).abs())
         .fold(0.0, f64::max);
-    // A slow drift has no single step out of line: then the worst ones are named.
+    // A slow drift has no single outlying step: in that case the largest deviations are named.
     let by_mm = slack_mm.min(0.999 * worst_mm);
     let gaps = (0..last).filter(|&k| differs(steps[k], by_mm));
     let gaps = gaps.map(|k| Gap {
@@ -101,7 +101,7 @@ pub(super) fn even_step(
     }))
 }
 
-/// The distances of neighbours and the usual one: the lower median, which of a right and a doubled step is the right one.
+/// The distances of neighbours and their lower median, which of a correct and a doubled step is the correct one.
 pub(super) fn steps(positions: &[Point3<f64>]) -> (Vec<f64>, f64) {
     let steps = positions.windows(2).map(|pair| (pair[1] - pair[0]).norm());
     let steps = steps.collect::<Vec<_>>();

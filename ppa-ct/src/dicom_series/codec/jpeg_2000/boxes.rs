@@ -5,7 +5,7 @@ use super::super::CodecError;
 /// Start of the signature box (section I.5.1).
 const SIGNATURE: [u8; 12] = *b"\0\0\0\x0cjP  \x0d\x0a\x87\x0a";
 
-/// A codestream as it is, or that of a JP2 file; palettes are refused, since their samples are no values.
+/// Returns a bare codestream unchanged, or that of a JP2 file; palettes are refused, since their samples are not values.
 pub(super) fn codestream(packed: &[u8]) -> Result<&[u8], CodecError> {
     if !packed.starts_with(&SIGNATURE) {
         return Ok(packed);
@@ -36,12 +36,12 @@ fn expect_no_palette(mut header: &[u8]) -> Option<Result<(), CodecError>> {
     Some(Ok(()))
 }
 
-/// Kind and body of the next box (section I.4).
+/// Reads kind and body of the next box (section I.4).
 fn next<'a>(rest: &mut &'a [u8]) -> Option<([u8; 4], &'a [u8])> {
     let (length, tail) = rest.split_first_chunk::<4>()?;
     let (kind, tail) = tail.split_first_chunk::<4>()?;
     let (body, tail) = match u32::from_be_bytes(*length) {
-        // To the end.
+        // The box extends to the end.
         0 => (tail, &[][..]),
         1 => {
             let (length, tail) = tail.split_first_chunk::<8>()?;

@@ -6,24 +6,24 @@
 use super::super::{CodecError, expect_grey};
 use super::segments::{Coding, Segments, Size};
 
-/// Tiles that any stream may have; beyond, each takes 14 bytes at least (SOT and SOD, sections A.4.2 and A.4.3).
+/// Number of tiles that any stream may have; each further tile takes at least 14 bytes (SOT and SOD, sections A.4.2 and A.4.3).
 const TILES_ALWAYS: u64 = 1 << 10;
-/// Bytes of the shortest tile-part.
+/// Size of the shortest tile-part in bytes.
 const TILE_BYTES: u64 = 14;
-/// Most tiles that the index of a tile-part can number (table A.5).
+/// Largest number of tiles that the index of a tile-part can count (table A.5).
 const TILES_AT_MOST: u64 = 65_535;
-/// Packets that any stream may have; beyond, each takes a byte at least (section B.10.1).
+/// Number of packets that any stream may have; each further packet takes at least a byte (section B.10.1).
 const PACKETS_ALWAYS: u64 = 1 << 16;
-/// Contributions of code-blocks to layers that any stream may have, and pixels that each takes beyond: 256 for blocks of
-/// 64 x 64 pixels in 16 layers, 16 for the smallest blocks in one.
+/// Number of contributions of code-blocks to layers that any stream may have. Beyond it, the number of pixels per
+/// contribution is limited: blocks of 64 x 64 pixels in 16 layers have 256, the smallest blocks in one layer have 16.
 const CONTRIBUTIONS_ALWAYS: u64 = 1 << 16;
 const PIXELS_PER_CONTRIBUTION: u64 = 4;
 /// Largest coordinate: 65535 pixels, each up to 255 steps of the reference grid apart.
 const FARTHEST: u64 = 65_535 * 255;
-/// Most halvings of the image: one of 65535 pixels is a single pixel after 16.
+/// Largest number of halvings of the image: 65535 pixels are reduced to one after 16.
 const LEVELS_AT_MOST: u8 = 16;
 
-/// Refuses a codestream that asks for more than its bytes and pixels warrant.
+/// Refuses a codestream that needs more work than its bytes and pixels justify.
 pub(super) fn check(stream: &[u8]) -> Result<(), CodecError> {
     let segments = Segments::read(stream).ok_or_else(|| {
         CodecError::Damaged("the headers of the codestream cannot be parsed".to_owned())
@@ -67,7 +67,7 @@ fn at_most(what: &'static str, found: u64, most: u64) -> Result<(), CodecError> 
     })
 }
 
-/// What one tile takes.
+/// Cost of decoding one tile.
 struct Cost {
     /// Packets: precincts of all resolutions, in every layer.
     packets: u64,
@@ -76,7 +76,7 @@ struct Cost {
 }
 
 impl Coding {
-    /// Counts over a tile of the component: `[x0, y0, x1, y1]` in its pixels.
+    /// Returns the cost of a tile of the component, `[x0, y0, x1, y1]` in its pixels.
     fn cost(&self, tile: [u64; 4]) -> Cost {
         let (mut precincts, mut blocks) = (0_u64, 0_u64);
         for resolution in 0..=self.levels {
@@ -85,7 +85,7 @@ impl Coding {
             let [x, y] = self.precinct(resolution);
             let across = cells([rect[0], rect[2]], x);
             precincts = precincts.saturating_add(across * cells([rect[1], rect[3]], y));
-            // Behind the lowest resolution, precincts are halved into three sub-bands (equation B-15).
+            // Above the lowest resolution, precincts are halved into three sub-bands (equation B-15).
             let halved = u8::from(resolution > 0);
             let block = [(self.block[0], x), (self.block[1], y)]
                 .map(|(block, precinct)| block.min(precinct.saturating_sub(halved)));
@@ -112,7 +112,7 @@ impl Coding {
     }
 }
 
-/// Cells of `2^exponent` that a range touches.
+/// Number of cells of size `2^exponent` that a range touches.
 fn cells([from, to]: [u64; 2], exponent: u8) -> u64 {
     if from >= to {
         return 0;
@@ -143,7 +143,7 @@ impl Size {
         side(0) * side(1)
     }
 
-    /// A tile in pixels of the component, `[x0, y0, x1, y1]` (equations B-7 to B-12).
+    /// Returns a tile in pixels of the component, `[x0, y0, x1, y1]` (equations B-7 to B-12).
     fn tile(&self, index: u64) -> [u64; 4] {
         let across = self.tiles_each_way()[0];
         let place = [index % across, index / across];

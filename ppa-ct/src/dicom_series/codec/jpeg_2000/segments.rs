@@ -4,32 +4,32 @@ use std::collections::HashMap;
 
 use super::super::{marker, segment};
 
-/// Progression changes that are followed: as many as layers and resolutions of a stream that anybody writes. Each makes
+/// Largest number of progression changes accepted: as many as layers and resolutions of any realistic stream. Each makes
 /// the decoder sort all precincts once more.
 const CHANGES_AT_MOST: usize = 64;
 
 /// Sizes on the reference grid, x before y (section A.5.1).
 #[derive(Debug)]
 pub(super) struct Size {
-    /// Where the image starts and ends.
+    /// Start and end of the image.
     pub start: [u64; 2],
     pub end: [u64; 2],
-    /// Size of a tile, and where the first one starts.
+    /// Size of a tile, and the start of the first one.
     pub tile: [u64; 2],
     pub tile_start: [u64; 2],
     pub components: usize,
-    /// Steps of the grid from pixel to pixel of the first component.
+    /// Steps of the grid between neighbouring pixels of the first component.
     pub step: [u64; 2],
 }
 
-/// How a tile is coded (sections A.6.1 and A.6.2).
+/// Coding parameters of a tile (sections A.6.1 and A.6.2).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Coding {
     pub layers: u64,
     pub levels: u8,
     /// Exponents of a code-block's sides.
     pub block: [u8; 2],
-    /// Exponents of the precincts' sides by resolution; 15 where there are none.
+    /// Exponents of the precincts' sides by resolution; empty means 15.
     precincts: Vec<u8>,
 }
 
@@ -40,7 +40,7 @@ impl Coding {
         both.map_or([15, 15], |both| [both & 0xf, both >> 4])
     }
 
-    /// Takes over what two segments have in common, from the number of levels on; `None` unless it fills the rest.
+    /// Reads the part that two segments have in common, from the number of levels on; `None` unless it fills the rest.
     fn component(&mut self, own_precincts: bool, body: &[u8]) -> Option<()> {
         let [levels, width, height, _, _, precincts @ ..] = body else {
             return None;
@@ -65,14 +65,14 @@ impl Coding {
                 self.layers = u16::from_be_bytes([*high, *low]).into();
                 self.component(style & 1 != 0, rest)
             }
-            // Of the only component.
+            // Parameters of the only component.
             (0x53, [0, style, rest @ ..]) => self.component(style & 1 != 0, rest),
             _ => None,
         }
     }
 }
 
-/// What the headers of a codestream and of its tile-parts say.
+/// Contents of the headers of a codestream and of its tile-parts.
 #[derive(Debug)]
 pub(super) struct Segments {
     pub size: Size,
@@ -81,10 +81,10 @@ pub(super) struct Segments {
 }
 
 impl Segments {
-    /// Follows the markers; `None` where they are not as the standard has them.
+    /// Reads the segments in order; `None` if they violate the standard.
     ///
-    /// The lengths of segments must be those of their contents: the decoder skips some by their length and others by
-    /// their contents, and must not see another stream than is looked at here.
+    /// The lengths of segments must match their contents: the decoder skips some by length and others by content,
+    /// and must not interpret the stream differently from this function.
     pub fn read(stream: &[u8]) -> Option<Self> {
         let mut rest = stream.strip_prefix(&[0xff, 0x4f, 0xff, 0x51])?;
         let size = size(segment(&mut rest)?)?;
@@ -116,7 +116,7 @@ impl Segments {
             let length = if length == 0 { rest.len() } else { length };
             let part = rest.get(..length)?;
             let mut inside = part.get(12..)?;
-            // Up to the start of data, or the end of a codestream without any.
+            // Up to the start of data, or the end of a codestream without data.
             while !inside.starts_with(&[0xff, 0x93]) && !inside.starts_with(&[0xff, 0xd9]) {
                 match marker(&mut inside)? {
                     kind @ (0x52 | 0x53) => {
@@ -135,12 +135,12 @@ impl Segments {
         })
     }
 
-    /// How a tile is coded.
+    /// Coding parameters of a tile.
     pub fn coding(&self, tile: u64) -> &Coding {
         self.by_tile.get(&tile).unwrap_or(&self.coding)
     }
 
-    /// All ways in which tiles are coded.
+    /// Coding parameters of all tiles.
     pub fn codings(&self) -> impl Iterator<Item = &Coding> {
         self.by_tile.values().chain([&self.coding])
     }
@@ -149,7 +149,7 @@ impl Segments {
 /// Start of a tile-part.
 const SOT: [u8; 2] = [0xff, 0x90];
 
-/// Leaves out a segment that decides no cost, if it has a right length.
+/// Skips a segment that does not affect the cost, if its length is valid.
 fn skip(marker: u8, rest: &mut &[u8], changes: &mut usize) -> Option<()> {
     // Markers without a segment (table A.1).
     if (0x30..=0x3f).contains(&marker) {
@@ -169,7 +169,7 @@ fn skip(marker: u8, rest: &mut &[u8], changes: &mut usize) -> Option<()> {
     right.then_some(())
 }
 
-/// Whether the steps of a quantization fill their segment (section A.6.4).
+/// Whether the quantization steps fill their segment (section A.6.4).
 fn quantization(body: &[u8]) -> bool {
     match body {
         [style, steps @ ..] => match style & 0x1f {

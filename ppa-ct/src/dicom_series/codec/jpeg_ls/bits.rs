@@ -1,14 +1,14 @@
 //! The bits of a scan, most significant first.
 
-/// Hands out bits; behind the end come zeros, and the reader remembers that they did.
+/// Reads bits; after the end it returns zeros and counts them.
 pub(super) struct Bits<'a> {
     bytes: &'a [u8],
-    /// Unread bits, in the upper end.
+    /// Unread bits, at the upper end.
     cache: u64,
     cached: u32,
-    /// Zeros that were made up.
+    /// Number of zeros returned after the end.
     missing: u32,
-    /// Whether the byte taken last was 0xff: the next one holds only seven bits (section A.1).
+    /// Whether the last byte read was 0xff: the next one holds only seven bits (section A.1).
     stuffed: bool,
 }
 
@@ -23,16 +23,16 @@ impl<'a> Bits<'a> {
         }
     }
 
-    /// Makes at least 48 bits available.
+    /// Makes at least 49 bits available.
     fn fill(&mut self) {
-        // Whole bytes at once, where none of the next eight announces a stuffed bit.
+        // Several bytes at once if none of the next eight announces a stuffed bit.
         if let (false, Some(next)) = (self.stuffed, self.bytes.first_chunk()) {
             let next = u64::from_be_bytes(*next);
             let (low, high) = (u64::MAX / 0xff * 0x7f, u64::MAX / 0xff * 0x80);
             let has_ff = ((next & low) + u64::MAX / 0xff) & next & high != 0;
             if !has_ff {
                 let taken = (64 - self.cached) / 8;
-                // What lies behind them is taken again later, and equal.
+                // The bits after them are read again later with the same result.
                 self.cache |= next >> self.cached;
                 self.cached += 8 * taken;
                 self.bytes = &self.bytes[taken as usize..];
@@ -41,7 +41,7 @@ impl<'a> Bits<'a> {
         }
         while self.cached <= 48 {
             match self.bytes {
-                // A byte above 0x7f behind 0xff makes a marker: the scan is over.
+                // A byte above 0x7f after 0xff forms a marker: the scan has ended.
                 [byte, rest @ ..] if !(self.stuffed && *byte > 0x7f) => {
                     let width = if self.stuffed { 7 } else { 8 };
                     self.cache |= u64::from(*byte) << (64 - width - self.cached);
@@ -63,19 +63,19 @@ impl<'a> Bits<'a> {
         if self.cached < count {
             self.fill();
         }
-        // Two shifts: a shift by all 64 bits is none.
+        // Two shifts: a single shift by all 64 bits is not allowed.
         let bits = (self.cache >> 1 >> (63 - count)) as u32;
         self.cache <<= count;
         self.cached -= count;
         bits
     }
 
-    /// Counts the zeros in front of the next one and takes all of them; `None` for more than `most`.
+    /// Counts the zeros before the next one bit and consumes all of them; `None` for more than `most`.
     #[inline]
     pub fn zeros(&mut self, most: u32) -> Option<u32> {
         let mut before = 0;
         let mut zeros = self.cache.leading_zeros();
-        // One filling holds 49 bits at least, a code up to 55 zeros.
+        // One fill holds at least 49 bits, a code up to 55 zeros.
         while zeros >= self.cached && before + self.cached <= most {
             before += self.cached;
             (self.cache, self.cached) = (0, 0);
@@ -90,7 +90,7 @@ impl<'a> Bits<'a> {
         Some(before + zeros)
     }
 
-    /// Whether more bits were taken than there are.
+    /// Whether more bits were read than exist.
     pub fn overdrawn(&self) -> bool {
         self.missing > self.cached
     }
@@ -102,7 +102,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against a list of all bits, whether bytes come one by one or eight at a time.
+        /// Compared with a list of all bits, whether bytes are read one by one or eight at a time.
         #[test]
         fn stuffed_bits_are_left_out(
             bytes in prop::collection::vec(prop_oneof![4 => any::<u8>(), 1 => Just(0xff)], 0..80),
@@ -140,7 +140,7 @@ mod tests {
         }
     }
 
-    /// The longest code of 16 bits with NEAR = 255: wherever it begins, and 0xff behind it, which is filled in bytewise.
+    /// The longest code of 16 bits with NEAR = 255, at any start, followed by 0xff, which is read byte by byte.
     #[test]
     fn a_code_may_begin_with_55_zeros() {
         for (lead, zeros) in (0..33).flat_map(|lead| (0..=55).map(move |zeros| (lead, zeros))) {

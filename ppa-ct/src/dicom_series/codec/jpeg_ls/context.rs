@@ -11,7 +11,7 @@ pub(super) struct Context {
     pub correction: i32,
     /// Errors counted, `N`.
     count: i64,
-    /// The Golomb parameter `k`, computed when the statistics are updated, since decoding would have to wait for it.
+    /// The Golomb parameter `k`, computed when the statistics are updated so that decoding need not wait for it.
     pub golomb: u32,
 }
 
@@ -27,13 +27,13 @@ impl Context {
         }
     }
 
-    /// Whether codes stand for errors mirrored about -1/2 (section A.5.2).
+    /// Whether codes represent errors mirrored about -1/2 (section A.5.2).
     #[inline]
     pub fn is_inverted(&self) -> bool {
         2 * self.bias <= -self.count
     }
 
-    /// Learns a quantised error.
+    /// Updates the statistics with a quantised error.
     #[inline]
     pub fn learn(&mut self, error: i32, step: i32, reset: i64) {
         self.bias += i64::from(error * step);
@@ -45,7 +45,7 @@ impl Context {
         }
         self.count += 1;
         self.golomb = golomb(self.count, self.magnitude);
-        // Without branches, which noise would make unpredictable. Clamping changes no bias within the bounds.
+        // Branch-free, since noise would make branches unpredictable. Clamping does not change a bias within the bounds.
         let (low, high) = (self.bias <= -self.count, self.bias > 0);
         let step = i64::from(low) - i64::from(high);
         self.bias = (self.bias + step * self.count).clamp(1 - self.count, 0);
@@ -53,14 +53,14 @@ impl Context {
     }
 }
 
-/// Statistics of the samples that end runs; one context where the neighbours agree, one where not.
+/// Statistics of the samples that end runs; one context for equal neighbours, one for different ones.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RunContext {
     magnitude: i64,
     count: i64,
     /// Negative errors, `Nn`.
     negative: i64,
-    /// 1 where the neighbours agree.
+    /// 1 if the neighbours agree.
     kind: i32,
 }
 
@@ -81,7 +81,7 @@ impl RunContext {
         )
     }
 
-    /// The error that a code stands for (section A.7.2.2).
+    /// Returns the error of a code (section A.7.2.2).
     pub fn error(&self, code: i32, k: u32) -> i32 {
         let doubled = code + self.kind;
         let mapped = doubled & 1;
@@ -113,7 +113,7 @@ fn first_magnitude(range: i32) -> i64 {
 /// Smallest `k` with `count · 2^k ≥ magnitude`; `count` is at least 1.
 #[inline]
 fn golomb(count: i64, magnitude: i64) -> u32 {
-    // Where both have as many bits, or one step further.
+    // The `k` at which both have the same number of bits, or the next one.
     let k = count
         .leading_zeros()
         .saturating_sub(magnitude.leading_zeros());

@@ -3,7 +3,7 @@
 use super::bits::Bits;
 use super::context::{Context, RunContext};
 
-/// Coding parameters as a stream gives them; zeros stand for the defaults.
+/// Coding parameters as stored in a stream; zeros select the defaults.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Thresholds {
     /// Largest sample, `MAXVAL`.
@@ -14,14 +14,14 @@ pub(super) struct Thresholds {
     pub reset: i32,
 }
 
-/// Everything that is fixed for a scan.
+/// Fixed parameters of a scan.
 #[derive(Debug)]
 pub(super) struct Coding {
     near: i32,
     largest: i32,
     t: [i32; 3],
     reset: i64,
-    /// Quantised errors, `RANGE`, and the bits of one, `qbpp`.
+    /// Number of quantised errors, `RANGE`, and the bits of one, `qbpp`.
     range: i32,
     error_bits: u32,
     /// Longest code, `LIMIT`.
@@ -69,7 +69,7 @@ impl Coding {
     }
 
     /// Decodes a scan of `columns` by `rows` samples into `samples`, which has room for them; `None` if it ends early or
-    /// makes no sense.
+    /// is invalid.
     pub fn decode(
         &self,
         scan: &[u8],
@@ -84,7 +84,7 @@ impl Coding {
             run_contexts: [0, 1].map(|kind| RunContext::new(self.range, kind)),
             run_index: 0,
         };
-        // One sample more on each side: the neighbours of the first and the last (section A.2.1).
+        // One more sample on each side: the neighbours of the first and the last (section A.2.1).
         let mut above = vec![0; columns + 2];
         let mut line = above.clone();
         for _ in 0..rows {
@@ -121,11 +121,11 @@ impl Coding {
         } else {
             i64::from(bits.take(self.error_bits)) + 1
         };
-        // Codes are at most twice an error, errors at most half the range.
+        // Codes are at most twice an error, and errors at most half the range.
         (code <= 2 * i64::from(self.range)).then_some(code as i32)
     }
 
-    /// A prediction and a quantised error make a sample (section A.4.5).
+    /// Reconstructs a sample from a prediction and a quantised error (section A.4.5).
     #[inline]
     fn sample(&self, prediction: i32, error: i32) -> i32 {
         let step = 2 * self.near + 1;
@@ -148,7 +148,7 @@ struct State<'a> {
 }
 
 impl State<'_> {
-    /// Decodes `line[1..]` up to the last but one; `above` is the line before.
+    /// Decodes `line[1..]` up to the last sample but one; `above` is the previous line.
     fn line(&mut self, above: &[i32], line: &mut [i32]) -> Option<()> {
         let columns = line.len() - 2;
         let coding = self.coding;
@@ -172,12 +172,12 @@ impl State<'_> {
         let coding = self.coding;
         let sign = context.signum();
         let context = &mut self.contexts[context.unsigned_abs() as usize];
-        // The median of these three, as the edge detector of section A.4.2 comes to.
+        // The median of these three, which is equivalent to the edge detector of section A.4.2.
         let edge = (a + b - c).clamp(a.min(b), a.max(b));
         let prediction = (edge + sign * context.correction).clamp(0, coding.largest);
         let k = context.golomb;
         let code = coding.code(&mut self.bits, k, coding.limit)?;
-        // Odd codes stand for negative errors.
+        // Odd codes represent negative errors.
         let mut error = (code >> 1) ^ -(code & 1);
         if k == 0 && coding.near == 0 && context.is_inverted() {
             error = -(error + 1);
@@ -186,7 +186,7 @@ impl State<'_> {
         Some(coding.sample(prediction, sign * error))
     }
 
-    /// Decodes a run from `x` on and the sample that ends it; returns the place behind (section A.7).
+    /// Decodes a run from `x` on and the sample that ends it; returns the position after it (section A.7).
     fn run(&mut self, above: &[i32], line: &mut [i32], mut x: usize) -> Option<usize> {
         let (columns, value) = (line.len() - 2, line[x - 1]);
         while self.bits.take(1) == 1 {
@@ -203,7 +203,7 @@ impl State<'_> {
         }
         let bits = RUN_BITS[self.run_index];
         let run = self.bits.take(bits) as usize;
-        // A run to the end of the line has no end that needs a sample.
+        // A run that ends with the line has no sample that ends it.
         if run > columns - x {
             return None;
         }
