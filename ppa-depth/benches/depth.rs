@@ -1,7 +1,7 @@
 //! One limb-like mesh before a recorded room, ideally and through a sensor, at the resolution of the device.
 //!
 //! Units of work: triangles for meshes, pixels for images and rays. The seed is the formula. Times are processor seconds of all
-//! threads, which depend less on what else the machine does than the clock on the wall.
+//! threads, which depend less on other load of the machine than wall-clock time.
 
 mod tube;
 
@@ -88,7 +88,7 @@ fn depth(c: &mut Criterion<ProcessorTime>) {
     group.bench_function("write_png", |b| {
         b.iter(|| noisy.write_png(&folder.path().join("depth.png")))
     });
-    // What a pose of one body shape takes in a dataset: both cameras, with noise, as files.
+    // The work for a pose of one body shape in a dataset: both cameras, with noise, as files.
     let other = PlacedBody {
         body: &limb,
         camera_from_body: Isometry3::new(

@@ -1,4 +1,4 @@
-//! A ball one metre before an Azure Kinect: the ideal depth image, and what the sensor measures of it.
+//! A ball one metre in front of an Azure Kinect: the ideal depth image, and the one that the sensor measures.
 //!
 //! `cargo run -p ppa-depth --example depth_of_ball`
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A ball of `steps` rings with twice as many corners each, its centre in the origin.
+/// A ball of `steps` rings with twice as many corners each, centred at the origin.
 fn ball(radius_mm: f32, steps: u32) -> Result<MeshBody, ppa_depth::BodyError> {
     let around = 2 * steps;
     let corner = |ring: u32, n: u32| {

@@ -12,11 +12,11 @@ use crate::render::body::PlacedBody;
 use crate::render::ideal::render;
 use crate::render::mesh_body::MeshBody;
 
-/// Which part of a surface matters, and what counts as seen.
+/// Part of a surface to consider, and criteria for visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoverageSettings {
-    /// Triangles whose middle is at most this far from the joint, mm.
+    /// Largest distance of the middle of a triangle from the joint, mm.
     pub radius_mm: f64,
     /// Largest angle of incidence, degrees.
     pub max_angle_deg: f64,
@@ -24,7 +24,7 @@ pub struct CoverageSettings {
 
 impl Default for CoverageSettings {
     /// Within 100 mm, about the length of the paper's region of interest; up to 70 degrees, where a pixel sees three times the
-    /// surface that it sees square on. Both are choices of ours.
+    /// surface that it sees at normal incidence. Both are our choices.
     fn default() -> Self {
         Self {
             radius_mm: 100.0,
@@ -33,7 +33,7 @@ impl Default for CoverageSettings {
     }
 }
 
-/// Why there is nothing to be seen.
+/// Reason why there is no coverage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoverageError {
@@ -43,7 +43,7 @@ pub enum CoverageError {
     /// The angle is not an angle of incidence.
     #[error("largest angle of incidence is {0} degrees, expected more than 0 and less than 90")]
     Angle(f64),
-    /// The mesh has no triangle there.
+    /// The mesh has no triangle near the joint.
     #[error("no surface within {radius_mm} mm of the joint at ({}, {}, {}) mm", joint[0], joint[1], joint[2])]
     NoSurface {
         /// The radius.
@@ -69,26 +69,26 @@ pub struct JointSurface {
     least_cos: f64,
 }
 
-/// What a camera sees of a [`JointSurface`].
+/// Part of a [`JointSurface`] that a camera sees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Coverage {
     /// Area that is in the image, not hidden, and not too oblique, mm².
     pub visible_mm2: f64,
-    /// That area over the whole.
+    /// Visible share of the total area.
     pub visible_share: f64,
-    /// Pixels on it.
+    /// Pixels on the visible area.
     pub pixels: f64,
-    /// Pixels per cm² of it; 0 if nothing is visible.
+    /// Pixels per cm² of visible area; 0 if nothing is visible.
     pub pixels_per_cm2: f64,
-    /// Side of the square of surface that a pixel sees on average, mm; none if nothing is visible.
+    /// Side of the square of surface that a pixel sees on average, mm; `None` if nothing is visible.
     pub mm_per_pixel: Option<f64>,
 }
 
-/// What covers a surface by less than this does not hide it, mm: the depth of a pixel holds for its centre.
+/// A surface is not hidden by one less than this in front of it, mm: the depth of a pixel is that of its centre.
 const HIDDEN_MM: f64 = 3.0;
 
 impl JointSurface {
-    /// The surface of `mesh` near `joint`, both in the frame of the mesh. It does not matter which way the triangles are turned.
+    /// The surface of `mesh` near `joint`, both in the frame of the mesh. The orientation of the triangles does not matter.
     ///
     /// # Errors
     /// [`CoverageError`] for a setting out of range or if there is no surface near the joint.
@@ -134,12 +134,12 @@ impl JointSurface {
         })
     }
 
-    /// Area of the whole, mm².
+    /// Total area, mm².
     pub fn area_mm2(&self) -> f64 {
         self.area_mm2
     }
 
-    /// What `camera` sees of the surface among the bodies of a scene, of which its own mesh is one. A camera inside one of them sees
+    /// Part of the surface that `camera` sees in a scene whose bodies include the surface's own mesh. A camera inside one of them sees
     /// nothing.
     pub fn seen(
         &self,
@@ -219,7 +219,7 @@ impl JointSurface {
 }
 
 impl Coverage {
-    /// Best first: who sees more of the surface, in whole percent; of those that see as much, who sees it more finely.
+    /// Orders the best first: by visible share in whole percent, then by pixels per cm².
     pub fn best_first(&self, other: &Self) -> Ordering {
         let percent = |coverage: &Self| (100.0 * coverage.visible_share).round();
         let finer = || other.pixels_per_cm2.total_cmp(&self.pixels_per_cm2);

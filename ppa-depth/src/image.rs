@@ -15,7 +15,7 @@ pub struct DepthImage {
     pub z_mm: Vec<f32>,
 }
 
-/// A depth image in whole millimetres, as 16-bit files hold it.
+/// A depth image in whole millimetres, as stored in 16-bit files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DepthU16 {
     /// Columns.
@@ -28,7 +28,7 @@ pub struct DepthU16 {
     pub too_far: usize,
 }
 
-/// What can go wrong with a depth image.
+/// Errors of depth images.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DepthError {
@@ -42,7 +42,7 @@ pub enum DepthError {
         /// Rows.
         height: u32,
     },
-    /// A sensor gave up all pixels.
+    /// The sensor rejected all pixels.
     #[error(
         "the sensor measures nothing: it rejects all {seen} pixels that see a surface (too dim, too oblique or at edges)"
     )]
@@ -60,12 +60,12 @@ pub enum DepthError {
         /// Pixels with a depth.
         pixels: usize,
     },
-    /// Something else hides everything that was to be seen.
+    /// Something else hides the entire surface.
     #[error(
         "the surface is hidden: something is in front of it in all of its {pixels} pixels (check the poses)"
     )]
     Hidden {
-        /// Pixels that it would have.
+        /// Number of pixels that it would cover.
         pixels: usize,
     },
     /// Two images that belong together differ in size.
@@ -99,7 +99,7 @@ pub enum DepthError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file cannot be read.
@@ -107,10 +107,10 @@ pub enum DepthError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system or the decoder said.
+        /// Error of the operating system or the decoder.
         source: std::io::Error,
     },
-    /// The PNG is no 16-bit grey image.
+    /// The PNG is not a 16-bit grey image.
     #[error("{} holds {found} pixels, expected 16-bit grey", path.display())]
     PixelFormat {
         /// The file.
@@ -149,7 +149,7 @@ impl DepthImage {
         self.z_mm.iter().copied().filter(|z_mm| *z_mm > 0.0)
     }
 
-    /// Refuses an image in which nothing was seen.
+    /// Returns an error if no pixel has a depth.
     ///
     /// # Errors
     /// [`DepthError::NothingVisible`].
@@ -163,7 +163,7 @@ impl DepthImage {
         }
     }
 
-    /// Refuses an image of a sensor in which nothing was measured; `seen` pixels see a surface.
+    /// Returns an error if an image of a sensor has no depth; `seen` pixels see a surface.
     ///
     /// # Errors
     /// [`DepthError::NothingMeasured`].
@@ -174,7 +174,7 @@ impl DepthImage {
         }
     }
 
-    /// Per pixel the nearer of two images of one camera: a background rendered once, merged with each pose of a limb.
+    /// The nearer depth per pixel of two images of one camera: a background rendered once, merged with each pose of a limb.
     ///
     /// # Errors
     /// [`DepthError::SizeMismatch`].
@@ -200,7 +200,7 @@ impl DepthImage {
         })
     }
 
-    /// This image before a background of the same camera: [`nearer_of`](Self::nearer_of), of which some must remain.
+    /// Puts this image in front of a background of the same camera by [`nearer_of`](Self::nearer_of); some of it must remain.
     ///
     /// # Errors
     /// [`DepthError::NothingVisible`] if nothing is seen without the background, [`DepthError::Hidden`] if all is behind it,
@@ -235,7 +235,7 @@ impl DepthImage {
         }
     }
 
-    /// Refuses an image that is not of a camera's size.
+    /// Returns an error if the image is not of the camera's size.
     pub(crate) fn check_camera(&self, camera: &Camera) -> Result<(), DepthError> {
         let (first, second) = ([camera.width(), camera.height()], [self.width, self.height]);
         if first != second {
@@ -244,7 +244,7 @@ impl DepthImage {
         self.check_length()
     }
 
-    /// Refuses an image whose buffer does not fit its size, before a file is begun.
+    /// Returns an error if the buffer does not fit the size, before a file is begun.
     pub(crate) fn check_length(&self) -> Result<(), DepthError> {
         if self.z_mm.len() == self.width as usize * self.height as usize {
             return Ok(());

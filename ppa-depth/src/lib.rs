@@ -1,6 +1,6 @@
 //! Depth images of meshes and recorded rooms through the camera model of a real Time-of-Flight device.
 //!
-//! A [`CameraSpec`] is what a user writes down (JSON); [`Camera`] is the checked camera, with the exact inverse of its
+//! A [`CameraSpec`] is the user's description (JSON); [`Camera`] is the checked camera, with the exact inverse of its
 //! lens distortion. A [`Body`] is a triangle mesh ([`MeshBody`]) or a cloud of oriented discs ([`SurfelBody`]), made
 //! once and then placed in as many poses as needed ([`PlacedBody`]). A mesh whose source was cut off has walls there
 //! ([`MeshBody::with_walls`]). [`render`] gives a [`DepthImage`]; [`roi_around`]
@@ -13,9 +13,9 @@
 //!
 //! [`render`] gives ideal depths at pixel centres. [`Backdrop`] renders the static scene once, with samples inside the pixels; a [`Sensor`] turns it
 //! into what a Time-of-Flight device might measure: random and systematic error, mixed pixels, invalid pixels, one bounce of light. [`Recorder`]
-//! makes frames of it. How close that is to a device is unknown until [`fit_noise`] has been run on a recording of it.
+//! records frames with it. How close they are to a device is unknown until [`fit_noise`] has been run on a recording of it.
 //!
-//! Repeatable: images depend on scene and seeds only, whatever the number of threads.
+//! Repeatable: images depend only on scene and seeds, not on the number of threads.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3};

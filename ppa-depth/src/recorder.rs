@@ -16,12 +16,12 @@ use crate::sensor::tremor::Tremor;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// A body that the camera cannot look at.
+    /// A body surrounds the camera, or its pose is invalid.
     #[error("body {body}")]
     Body {
-        /// Its place among the bodies, from 0.
+        /// Index of the body, from 0.
         body: usize,
-        /// What is wrong.
+        /// Cause.
         source: BodyError,
     },
     /// An image without a depth.
@@ -29,20 +29,20 @@ pub enum RecordError {
     Depth(#[from] DepthError),
 }
 
-/// A camera that records bodies which tremble, with nothing behind them.
+/// A camera that records trembling bodies, with nothing behind them.
 pub struct Recorder {
     camera: Camera,
-    /// With what stands behind the bodies, as the sensor needs it.
+    /// The sensor with the backdrop that it needs.
     sensor: Option<(Sensor, Backdrop)>,
     tremor: Tremor,
     seed: u64,
 }
 
 impl Recorder {
-    /// An ideal camera or one with a `sensor`; `seed` is that of noise and tremor.
+    /// An ideal camera or one with a `sensor`; `seed` determines noise and tremor.
     ///
     /// # Errors
-    /// [`SensorError`] naming the number of the tremor that makes no sense.
+    /// [`SensorError`] naming the number of the tremor that is out of range.
     pub fn new(
         camera: Camera,
         sensor: Option<Sensor>,
@@ -50,7 +50,7 @@ impl Recorder {
         seed: u64,
     ) -> Result<Self, SensorError> {
         tremor.check()?;
-        camera.rays(); // Not with the first frame, whose time may be taken.
+        camera.rays(); // Not at the first frame, which may be timed.
         let backdrop = |sensor| (sensor, Backdrop::new(&camera, &[]));
         let sensor = sensor.map(backdrop);
         Ok(Self {
@@ -61,7 +61,7 @@ impl Recorder {
         })
     }
 
-    /// The lens.
+    /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
@@ -71,11 +71,11 @@ impl Recorder {
         self.sensor.as_ref().map(|(sensor, _)| sensor)
     }
 
-    /// One frame of bodies that the tremor moves from where they are placed, all alike, about `pivot`, mm in the camera's frame. The
-    /// same whatever frames were recorded before.
+    /// One frame of bodies that the tremor moves together from their poses, about `pivot`, mm in the camera's frame. It does not
+    /// depend on frames recorded before.
     ///
     /// # Errors
-    /// [`RecordError`] if the camera stands inside a body, or if no pixel has a depth.
+    /// [`RecordError`] if the camera is inside a body, or if no pixel has a depth.
     pub fn frame(
         &self,
         bodies: &[PlacedBody],

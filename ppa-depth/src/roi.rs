@@ -5,7 +5,7 @@ use ppa_core::Roi;
 
 use crate::camera::projection::Camera;
 
-/// Why there is no square around a joint.
+/// Reason why there is no square around a joint.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RoiError {
@@ -18,10 +18,10 @@ pub enum RoiError {
         found_mm[0], found_mm[1], found_mm[2]
     )]
     NotInView {
-        /// Where it is.
+        /// Position of the joint, mm.
         found_mm: [f64; 3],
     },
-    /// The joint falls beside the image.
+    /// The joint is outside the image.
     #[error("the joint falls on pixel ({:.1}, {:.1}), outside the {width} x {height} image", pixel[0], pixel[1])]
     OutsideImage {
         /// Column and row.
@@ -36,11 +36,11 @@ pub enum RoiError {
         "a region of {side_mm} mm at {z_mm:.0} mm covers {pixels:.2} pixels, expected at least 1"
     )]
     TooSmall {
-        /// The side asked for.
+        /// Requested side.
         side_mm: f64,
         /// Depth of the joint.
         z_mm: f64,
-        /// Its size in the image.
+        /// Side in the image.
         pixels: f64,
     },
 }

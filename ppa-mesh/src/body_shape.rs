@@ -17,7 +17,7 @@ const HEIGHT_MM: [f64; 2] = [4.0, 10.0];
 const SIGMA_MM: [f64; 2] = [8.0, 20.0];
 /// Largest shift, and largest height, depth and sigma of a bump, mm.
 const MOST_MM: f64 = 200.0;
-/// Most bumps of one draw.
+/// Largest number of bumps per draw.
 const MOST_BUMPS: usize = 1000;
 /// A bump ends at this many sigma; there it is exp(−8) of its height.
 const REACH_SIGMA: f64 = 4.0;
@@ -45,23 +45,23 @@ pub struct BumpSite {
     pub radius_mm: f64,
 }
 
-/// Why there is no such body shape.
+/// Reason why a body shape cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// Bumps are wanted but there is nowhere to put them.
+    /// Bumps were requested without a site.
     #[error("the number of bumps is {count}, but no site is given for them")]
     NoSite {
-        /// Bumps wanted.
+        /// Requested number of bumps.
         count: usize,
     },
-    /// More bumps than a skin has room for.
+    /// More bumps than the maximum.
     #[error("the number of bumps is {count}, expected at most {MOST_BUMPS}")]
     TooMany {
-        /// Bumps wanted.
+        /// Requested number of bumps.
         count: usize,
     },
-    /// A bump that is none.
+    /// A bump with a value that is not finite or out of range.
     #[error(
         "bump {index} is {height_mm} mm high with a sigma of {sigma_mm} mm: its position must be finite, its height \
          between -{MOST_MM} and {MOST_MM} mm, its sigma above 0 and at most {MOST_MM} mm"
@@ -74,13 +74,13 @@ pub enum ShapeError {
         /// Width found, mm.
         sigma_mm: f64,
     },
-    /// A shift that is none.
+    /// A shift that is not a number or out of range.
     #[error("the shift is {found_mm} mm, expected -{MOST_MM} to {MOST_MM} mm")]
     Shift {
         /// Distance found, mm.
         found_mm: f64,
     },
-    /// No site holds a vertex.
+    /// No site contains a vertex.
     #[error("no vertex of the mesh lies in any of the {sites} bump sites")]
     NoSkin {
         /// Number of sites.
@@ -91,9 +91,9 @@ pub enum ShapeError {
 /// The mesh moved along its smoothed normals, outward for a positive distance.
 ///
 /// Normals are averaged over a few rings of neighbours first, so that creases and noise do not
-/// make spikes. The distance is exact nearly everywhere. Only where the skin would turn inside out or
-/// pass through itself (inwards at the tips of toes, outwards between them) it moves less, and the
-/// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`](crate::Displacement) shows where.
+/// cause spikes. The distance is exact nearly everywhere. Where the skin would turn inside out or
+/// pass through itself (inwards at the tips of toes, outwards between them), it moves less, and the
+/// distance recovers by 0.2 mm per millimetre of skin around. [`Displacement`](crate::Displacement) shows where.
 ///
 /// # Errors
 /// [`ShapeError::Shift`] for a distance that is not a number or out of range.
@@ -116,7 +116,7 @@ pub fn offset(mesh: &Mesh, distance_mm: f64) -> Result<Mesh, ShapeError> {
 /// [`offset`]. A mesh without vertices stays as it is.
 ///
 /// # Errors
-/// [`ShapeError::Size`] for a bump whose place, height or width is not a number or out of range.
+/// [`ShapeError::Size`] for a bump whose position, height or width is not a number or out of range.
 pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, ShapeError> {
     for (index, bump) in bumps.iter().enumerate() {
         let placed = bump.centre.coords.iter().all(|c| c.is_finite());
@@ -145,11 +145,11 @@ pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, ShapeError> {
 
 /// `count` bumps of 4 to 10 mm height and 8 to 20 mm sigma at vertices of the sites, taken in turn.
 ///
-/// A site without vertices is passed over: the scan may end before it. The result depends on the
-/// mesh, the sites and the seed only; bump i is the same for any count.
+/// A site without vertices is skipped: the scan may end before it. The result depends only on the
+/// mesh, the sites and the seed; bump i is the same for any count.
 ///
 /// # Errors
-/// [`ShapeError`] when bumps are wanted but there is no site or no site holds a vertex.
+/// [`ShapeError`] when bumps are requested but there is no site or no site contains a vertex.
 pub fn seeded_bumps(
     mesh: &Mesh,
     sites: &[BumpSite],
@@ -192,7 +192,7 @@ pub fn seeded_bumps(
     Ok((0..count).map(bump).collect())
 }
 
-/// Uniform in [0, 1): number `index` of a SplitMix64 generator that the seed starts.
+/// Uniform in [0, 1): number `index` of a SplitMix64 generator seeded with `seed`.
 fn uniform(seed: u64, index: u64) -> f64 {
     let bits = split_mix_at(split_mix(seed), index);
     (bits >> 11) as f64 / (1_u64 << 53) as f64
@@ -211,7 +211,7 @@ fn displaced(
         normals: Vec::new(),
         triangles: mesh.triangles.clone(),
     };
-    // Where nothing moved nearby the normals of the original are the better ones.
+    // Where nothing moved nearby, the original normals are better.
     let turned = moved.geometric_normals();
     let before = mesh.geometric_normals();
     moved.normals = turned
@@ -247,7 +247,7 @@ impl Ord for Reached {
     }
 }
 
-/// Vertices within `reach_mm` of the vertex nearest to `centre`, and how far along the surface.
+/// Vertices within `reach_mm` of the vertex nearest to `centre`, with their distances along the surface.
 ///
 /// Shortest edge paths (Dijkstra) overestimate; the straight distance is a lower bound and nearly
 /// right where the surface is flat. The larger of straight and shortened path is continuous

@@ -8,12 +8,12 @@ use nalgebra::Point3;
 use crate::point_cells::PointCells;
 use crate::topology::{join, root};
 
-/// Outcome of [`dbscan`].
+/// Result of [`dbscan`].
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Clusters {
     /// Cluster of each point, numbered from 0; `None` for noise.
     pub labels: Vec<Option<u32>>,
-    /// Whether each point has enough points around it to carry a cluster on.
+    /// Whether each point is a core point.
     pub core: Vec<bool>,
     /// Number of points of each cluster.
     pub sizes: Vec<usize>,
@@ -29,13 +29,13 @@ impl Clusters {
 }
 
 /// DBSCAN (Ester et al. 1996): points with at least `min_points` points (themselves included)
-/// within `eps_mm` are core points, core points that near to each other share a cluster, and other
+/// within `eps_mm` are core points, core points within that distance share a cluster, and other
 /// points near a core point join its cluster; the rest is noise.
 ///
 /// Clusters are numbered by their first core point, and a border point between several joins the
 /// first of them. Memory grows with the number of points, time with that number times the points
 /// within `eps_mm`: 700 000 points of a skin take about 0.15 s of processor time. Points that are not
-/// finite are noise; a radius that is not positive leaves every point alone.
+/// finite are noise; with a radius that is not positive, no point has neighbours.
 pub fn dbscan(points: &[Point3<f32>], eps_mm: f64, min_points: usize) -> Clusters {
     if eps_mm.is_nan() || eps_mm <= 0.0 {
         return alone(points, min_points);
@@ -114,7 +114,7 @@ pub fn dbscan(points: &[Point3<f32>], eps_mm: f64, min_points: usize) -> Cluster
     clusters
 }
 
-/// Points without neighbours: clusters of their own if that is enough, else noise.
+/// Clusters of points without neighbours: one per point if `min_points` is at most 1, otherwise noise.
 fn alone(points: &[Point3<f32>], min_points: usize) -> Clusters {
     let core: Vec<bool> = points
         .iter()

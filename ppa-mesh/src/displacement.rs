@@ -6,21 +6,21 @@ use nalgebra::Vector3;
 
 use crate::mesh::Mesh;
 
-/// What moved between two meshes with the same triangles, such as a skin and its [`offset`](crate::offset).
+/// Displacement between two meshes with the same triangles, such as a skin and its [`offset`](crate::offset).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Displacement {
     /// How far each vertex moved, mm.
     pub shifts_mm: Vec<f64>,
-    /// Volume swept outwards less that swept inwards, mm³: how much more the second mesh encloses. An open
-    /// rim is carried along, and what it sweeps within its own opening does not count.
+    /// Volume swept outwards minus volume swept inwards, mm³: the increase of the enclosed volume. The
+    /// volume that an open rim sweeps within its own opening does not count.
     pub volume_mm3: f64,
 }
 
 impl Displacement {
-    /// From `before` to `after`, which must have as many vertices and the same triangles.
+    /// Displacement from `before` to `after`, which must have as many vertices and the same triangles.
     ///
     /// The rate of change of volume, triangles' vector areas times the mean shift of their corners, is
-    /// quadratic in the part of the way, so that Simpson's rule gives its integral exactly.
+    /// quadratic in the fraction of the displacement, so Simpson's rule integrates it exactly.
     pub fn between(before: &Mesh, after: &Mesh) -> Self {
         let shift = |v: u32| {
             let [from, to] = [before, after].map(|mesh| mesh.vertices[v as usize].cast::<f64>());

@@ -6,7 +6,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-/// Why nothing can be known of the neighbourhood of points.
+/// Reason why a cloud cannot be searched for neighbours.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CloudError {
@@ -29,7 +29,7 @@ pub enum CloudError {
     NotFinite(usize),
 }
 
-/// Unit normals of `points` (mm), each square to the plane of least squares through its
+/// Unit normals of `points` (mm), each perpendicular to the least-squares plane through its
 /// `neighbours` nearest points. Their sign is arbitrary.
 ///
 /// # Errors

@@ -2,13 +2,13 @@
 //!
 //! [`iso_surface`] turns a volume into a triangle [`Mesh`]; [`extract_limb`] finds the limb in a scan
 //! and cuts couch, sheets and neighbours; [`offset`], [`add_bumps`] and [`seeded_bumps`] make other
-//! body shapes of it, whose [`Displacement`] can be measured; [`dbscan`] clusters points; [`write_mesh_file`], [`write_cloud_file`] and
+//! body shapes from it; [`Displacement`] measures the change; [`dbscan`] clusters points; [`write_mesh_file`], [`write_cloud_file`] and
 //! [`read_mesh_file`] exchange meshes and clouds with other programs as PLY, OBJ and STL.
 //!
-//! Units: mm, HU. Frame: whatever frame the volume's affine leads to, normally `ct` (LPS).
+//! Units: mm, HU. Frame: that of the volume's affine, normally `ct` (LPS).
 //! Triangles are counter-clockwise seen from outside and normals point outward.
 //! Repeatable: the same input gives the same vertices in the same order for any number of threads.
-//! Left out: decimation and any other file format.
+//! Not included: decimation and other file formats.
 
 mod body_shape;
 mod compiled_with;

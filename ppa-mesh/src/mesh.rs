@@ -62,8 +62,7 @@ impl Mesh {
 
     /// Signed volume enclosed, mm³; positive when triangles are counter-clockwise seen from outside.
     ///
-    /// Only meaningful without boundary edges: an open mesh is closed by a cone from its first vertex,
-    /// whichever that is.
+    /// Only meaningful without boundary edges: an open mesh is closed by a cone from its first vertex.
     pub fn volume_mm3(&self) -> f64 {
         let origin = self
             .vertices
@@ -80,7 +79,7 @@ impl Mesh {
             .sum()
     }
 
-    /// The triangles all of whose vertices are kept, with their vertices renumbered in order.
+    /// Triangles whose vertices are all kept, with the vertices renumbered in order.
     pub(crate) fn restricted(&self, keep: impl Fn(u32) -> bool) -> Self {
         let mut part = Self::default();
         let mut number = vec![u32::MAX; self.vertices.len()];

@@ -5,22 +5,22 @@ use std::ops::Range;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-/// Cells per axis that a key has room for; points farther out share the outermost cell, which costs
-/// time but loses no pair.
+/// Number of cells per axis that fit into a key; points farther out share the outermost cell, which
+/// costs time but loses no pair.
 const LAST_CELL: f64 = ((1 << 21) - 3) as f64;
 
-/// Cells of a unit of parallel work.
+/// Number of cells per parallel task.
 const CELLS_PER_TASK: usize = 4096;
 
 /// The finite points of a cloud, ordered by cell.
 pub struct PointCells {
-    /// mm.
+    /// Positions, mm.
     places: Vec<[f32; 3]>,
     /// Index of each place in the cloud.
     original: Vec<u32>,
-    /// Keys of the cells that hold points, ascending, and their first places.
+    /// Keys of the cells that contain points, ascending.
     keys: Vec<u64>,
-    /// One more than keys.
+    /// Index of the first place of each cell; one entry more than `keys`.
     starts: Vec<u32>,
     radius_sq: f64,
 }
@@ -46,7 +46,7 @@ impl PointCells {
     /// Cells of `radius` (mm, positive) for the finite ones of `points` (mm).
     pub fn new(points: &[Point3<f32>], radius: f64) -> Self {
         let finite = |i: &u32| points[*i as usize].coords.iter().all(|c| c.is_finite());
-        // A little wider, so that rounding puts no two places within the radius two cells apart.
+        // Slightly wider, so that rounding cannot put two places within the radius two cells apart.
         let width = radius * (1.0 + 1e-9);
         let low = (0..points.len() as u32)
             .filter(finite)
@@ -95,7 +95,7 @@ impl PointCells {
         squares[0] + squares[1] + squares[2] <= self.radius_sq
     }
 
-    /// Something of every place, in order, from its neighbourhood.
+    /// Applies `of_place` to every place and its neighbourhood and returns the results in order.
     pub fn map<T: Send>(&self, of_place: impl Fn(usize, &Rows) -> T + Sync) -> Vec<T> {
         let tasks = 0..self.keys.len().div_ceil(CELLS_PER_TASK);
         let tasks = tasks.into_par_iter().flat_map_iter(|task| {
@@ -110,13 +110,13 @@ impl PointCells {
         tasks.collect()
     }
 
-    /// The places of every cell, and those around it.
+    /// Calls `visit` with the places of every cell and the rows around it.
     pub fn for_each(&self, visit: impl FnMut(Range<usize>, &Rows)) {
         self.sweep(0..self.keys.len(), visit);
     }
 
-    /// Cells come in the order of their keys, and so do the rows around them: each row's ends only
-    /// ever move on.
+    /// Visits cells in the order of their keys. The rows around them come in the same order, so the ends
+    /// of each row only advance.
     fn sweep(&self, cells: Range<usize>, mut visit: impl FnMut(Range<usize>, &Rows)) {
         let Some(&key) = self.keys.get(cells.start) else {
             return;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::mesh::Mesh;
 
-/// Cells along an axis that a key has room for; what lies beyond shares the last one.
+/// Number of cells along an axis that fit into a key; cells beyond share the last one.
 const LAST_CELL: f64 = ((1 << 21) - 1) as f64;
 
 impl Mesh {
@@ -18,7 +18,7 @@ impl Mesh {
     }
 }
 
-/// As [`Mesh::self_crossings`], of triangles between `places`.
+/// The same as [`Mesh::self_crossings`] for triangles between `places`.
 pub fn self_crossings(places: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let boxes: Vec<[Point3<f64>; 2]> = triangles
         .par_iter()
@@ -64,7 +64,7 @@ pub fn self_crossings(places: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<[u3
             })
         })
         .collect();
-    // A pair meets in every cell that both reach.
+    // A pair is found in every cell that both overlap.
     found.par_sort_unstable();
     found.dedup();
     found

@@ -13,18 +13,18 @@ const LEAST_AREA_RATIO: f64 = 0.2;
 const REDUCTION: f64 = 0.9;
 /// Enough rounds to reduce a shift to less than a hundredth, for folds and again for crossings.
 const ROUNDS: usize = 45;
-/// Rounds in which crossings between neighbours are repaired by steps aside alone.
+/// Rounds in which crossings between neighbours are repaired by sideways steps only.
 const EVEN_ROUNDS: usize = 20;
 /// Change of the shift per length of skin next to a reduced place.
 const SLOPE: f64 = 0.2;
 
-/// Where the vertices of a mesh go, by unit directions and shifts along them, mm, made such that the mesh
-/// neither folds nor passes through itself; places by vertex.
+/// New positions of the vertices of a mesh, moved along unit directions by shifts (mm) that are reduced
+/// such that the mesh neither folds nor passes through itself.
 ///
-/// Inwards it folds where it is curved outwards more tightly than the shift (the tips of toes) and
-/// meets itself where it is thinner than twice the shift; outwards in creases and between toes. There
-/// the shifts are made smaller, and smoothly around. Triangles that turn over because their corners go
-/// in slightly different directions are spread out across them instead.
+/// Inwards, it folds where it is curved outwards more tightly than the shift (the tips of toes) and
+/// meets itself where it is thinner than twice the shift; outwards, in creases and between toes. There
+/// the shifts are reduced, with a smooth transition. Triangles that turn over because their corners move
+/// in slightly different directions are spread out perpendicular to them instead.
 pub fn without_folds(
     mesh: &Mesh,
     neighbours: &Neighbours,
@@ -97,10 +97,9 @@ fn crossing_vertices(
     (near, far)
 }
 
-/// Steps across their directions by which some vertices and those around them come between their
-/// neighbours.
+/// Sideways steps that move some vertices and those around them between their neighbours.
 ///
-/// Vertices in the mean of their neighbours, those farther out held fast, form no folds (Tutte 1963,
+/// Vertices at the mean of their neighbours, with those farther out fixed, form no folds (Tutte 1963,
 /// doi:10.1112/plms/s3-13.1.743).
 fn even_steps(
     neighbours: &Neighbours,
@@ -148,8 +147,8 @@ fn relax(
     }
 }
 
-/// Twice the vector area of the triangles around each vertex, which depends on the outline of
-/// these alone: single slivers, whose normals say nothing, do not disturb it.
+/// Twice the vector area of the triangles around each vertex, which depends only on their outline:
+/// single slivers, whose normals are unreliable, do not affect it.
 fn vertex_areas(mesh: &Mesh, place: impl Fn(u32) -> Point3<f64>) -> Vec<Vector3<f64>> {
     let mut areas = vec![Vector3::zeros(); mesh.vertices.len()];
     for triangle in &mesh.triangles {

@@ -11,7 +11,7 @@ const ROUNDS: usize = 24;
 /// Edges shorter than this weigh no more than it, mm.
 const SHORTEST_MM: f32 = 1e-4;
 
-/// Normals averaged with those of near neighbours, the nearer the more: vertices of a sliver get
+/// Normals averaged with those of near neighbours, weighted by proximity: vertices of a sliver get
 /// nearly the same normal, so that it does not turn over when they move.
 pub fn smooth_normals(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vector3<f64>> {
     let mut normals: Vec<Vector3<f64>> = mesh.normals.iter().map(|n| n.cast()).collect();

@@ -2,16 +2,16 @@
 
 use crate::mesh::Mesh;
 
-/// How the triangles of a mesh hang together. Vertices without a triangle do not count.
+/// Connectivity of the triangles of a mesh. Vertices without a triangle do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Topology {
     /// Vertices used by a triangle.
     pub vertices: usize,
-    /// Different edges.
+    /// Distinct edges.
     pub edges: usize,
-    /// Edges of one triangle only; 0 for a closed surface.
+    /// Edges that belong to one triangle only; 0 for a closed surface.
     pub boundary_edges: usize,
-    /// Edges of more than two triangles; 0 for a manifold.
+    /// Edges that belong to more than two triangles; 0 for a manifold.
     pub non_manifold_edges: usize,
     /// Connected pieces, by shared vertices.
     pub components: usize,
@@ -74,7 +74,7 @@ impl Mesh {
             join(&mut parent, b, c);
         }
         for v in 0..parent.len() {
-            // Parents have smaller indices, so they are already at their root.
+            // Parents have smaller indices, so they already point to their root.
             parent[v] = parent[parent[v] as usize];
         }
         parent

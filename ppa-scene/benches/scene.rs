@@ -26,7 +26,7 @@ fn scene(criterion: &mut Criterion<ProcessorTime>) {
     group.bench_function("built_in_room", |b| {
         b.iter(|| table_plane(black_box(&room.cloud), &settings, 1))
     });
-    // 1000 planes, as Open3D's `segment_plane` is asked for by benches/peers/table_plane.py.
+    // 1000 planes, as requested from Open3D's `segment_plane` by benches/peers/table_plane.py.
     let recorded = recorded_room::room_cloud(368_640, 11, 300.0..1400.0);
     group.throughput(Throughput::Elements(recorded.points.len() as u64));
     let settings = PlaneSettings::default();
@@ -69,7 +69,7 @@ fn scene(criterion: &mut Criterion<ProcessorTime>) {
             })
         });
     }
-    // As many vertices as the surface of a whole scan with voxels of half a millimetre has.
+    // As many vertices as the surface of a whole scan with voxels of half a millimetre.
     let fine = LowerLeg::p01()
         .voxelise(0.5, TableTop::Absent)
         .expect("phantom");

@@ -1,4 +1,4 @@
-//! Lays a leg on the table of the built-in x-ray room, turned inwards by 18 degrees.
+//! Lays a leg on the table of the built-in x-ray room, rotated inwards by 18 degrees.
 //!
 //! `cargo run -p ppa-scene --example place_leg`
 

@@ -77,7 +77,7 @@ impl<To, From> fmt::Debug for Rigid<To, From> {
 }
 
 impl<To, From> Rigid<To, From> {
-    /// Names the frames of an isometry.
+    /// Assigns frames to an isometry.
     pub fn new(isometry: Isometry3<f64>) -> Self {
         Self {
             isometry,
@@ -85,7 +85,7 @@ impl<To, From> Rigid<To, From> {
         }
     }
 
-    /// The frames coincide.
+    /// The identity: both frames coincide.
     pub fn identity() -> Self {
         Self::new(Isometry3::identity())
     }
@@ -102,7 +102,7 @@ impl<To, From> Rigid<To, From> {
         ))
     }
 
-    /// The motion back.
+    /// The inverse motion.
     pub fn inverse(&self) -> Rigid<From, To> {
         Rigid::new(self.isometry.inverse())
     }
@@ -112,12 +112,12 @@ impl<To, From> Rigid<To, From> {
         &self.isometry
     }
 
-    /// Turns a direction; the translation plays no part.
+    /// Rotates a direction; the translation has no effect.
     pub fn rotate(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         self.isometry.rotation * direction
     }
 
-    /// Row-major homogeneous 4x4 matrix, mm, as manifests hold it.
+    /// Row-major homogeneous 4x4 matrix, mm, as stored in manifests.
     pub fn to_homogeneous_rows(&self) -> TransformRows {
         let matrix = self.isometry.to_homogeneous();
         std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
@@ -127,7 +127,7 @@ impl<To, From> Rigid<To, From> {
 impl<To, From> TryFrom<TransformRows> for Rigid<To, From> {
     type Error = RigidError;
 
-    /// The rounding that [`check_rigid`] accepts is removed: the rotation is the nearest one.
+    /// Removes the rounding that [`check_rigid`] accepts: takes the nearest rotation.
     fn try_from(rows: TransformRows) -> Result<Self, RigidError> {
         check_rigid(&rows)?;
         let linear = Matrix3::from_fn(|row, column| rows[row][column]);

@@ -1,4 +1,4 @@
-//! The mesh on which depth images are measured, ours and those of other programs.
+//! The mesh on which our depth images and those of other programs are timed.
 
 use nalgebra::Point3;
 

@@ -71,13 +71,13 @@ struct OrbbecDistortion {
     model: Option<serde_json::Value>,
 }
 
-/// Names of the Orbbec models that are ours: with three and with six radial coefficients.
+/// Names of the supported Orbbec models: with three and with six radial coefficients.
 const ORBBEC_MODELS: &[&str] = &[
     "OB_DISTORTION_BROWN_CONRADY",
     "OB_DISTORTION_BROWN_CONRADY_K6",
 ];
 
-/// Stands for a metric radius that the factory could not determine (public Azure Kinect Sensor SDK, `calibration.c`).
+/// Value for a metric radius that the factory could not determine (public Azure Kinect Sensor SDK, `calibration.c`).
 const DEFAULT_METRIC_RADIUS: f64 = 1.7;
 
 impl CameraSpec {
@@ -85,7 +85,7 @@ impl CameraSpec {
     /// an Orbbec camera that emulates one, an Orbbec `OBCameraParam` as JSON (`depth_intrinsic`, `depth_distortion`), or an
     /// OpenCV file storage in YAML (`.yml`, `.yaml`).
     ///
-    /// The Orbbec reader follows the field names of the public SDK and takes the lens for `brown_conrady`; no file from a device was available.
+    /// The Orbbec reader follows the field names of the public SDK and assumes a `brown_conrady` lens; no file from a device was available.
     /// Compare a few pixels with the SDK before trusting it.
     ///
     /// Only the raw calibration depends on the `mode`: it holds for the whole sensor. The numbers are checked by

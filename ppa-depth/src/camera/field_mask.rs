@@ -22,7 +22,7 @@ pub enum FieldMask {
 }
 
 impl FieldMask {
-    /// Whether light comes back from the direction (X/Z, Y/Z).
+    /// Whether light returns from the direction (X/Z, Y/Z).
     pub fn contains(&self, slopes: &Vector2<f64>) -> bool {
         let half = |deg: f64| (0.5 * deg).to_radians().tan();
         match *self {

@@ -26,7 +26,7 @@ const BEYOND: f64 = 1.2;
 const LEAST_RADIUS: f64 = 0.05;
 /// Radii and directions at which the derivatives of the lens are sampled.
 const SAMPLES: (usize, usize) = (64, 24);
-/// Covers what lies between the samples.
+/// Safety factor for places between the samples.
 const SAFETY: f64 = 2.0;
 
 impl Optics {
@@ -44,7 +44,7 @@ impl Optics {
             bounds = [bounds[0].inf(ray), bounds[1].sup(ray)];
             reach = reach.max(ray.norm());
         }
-        // At the fold the inverse has no finite slope, and near it edges bow without measure.
+        // At the fold the inverse has no finite slope, and near it edges bow without bound.
         let radius = (BEYOND * reach + LEAST_RADIUS).min(0.5 * (reach + lens.fold()));
         let (bow, stretch) = bow_and_stretch(spec, lens, radius);
         // A pole: no triangle is projected, each is tested against all pixels.

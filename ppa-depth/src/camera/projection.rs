@@ -11,7 +11,7 @@ use crate::camera::spec::{CameraError, CameraSpec};
 
 /// A checked camera: projection, its exact inverse, and the rays of its pixels.
 ///
-/// `TryFrom<CameraSpec>` is the only way in. Cloning is cheap: clones share the table of rays.
+/// `TryFrom<CameraSpec>` is the only constructor. Cloning is cheap: clones share the table of rays.
 #[derive(Debug, Clone)]
 pub struct Camera {
     spec: CameraSpec,
@@ -33,7 +33,7 @@ impl TryFrom<CameraSpec> for Camera {
 }
 
 impl Camera {
-    /// The numbers that the camera was made from.
+    /// Parameters of the camera.
     pub fn spec(&self) -> &CameraSpec {
         &self.spec
     }
@@ -57,7 +57,7 @@ impl Camera {
             .map(|(pixel, _)| pixel)
     }
 
-    /// [`project`](Self::project), and how the pixel moves with (X/Z, Y/Z).
+    /// [`project`](Self::project), and the derivative of the pixel with respect to (X/Z, Y/Z).
     pub(crate) fn project_with_jacobian(
         &self,
         point: &Point3<f64>,
@@ -80,7 +80,7 @@ impl Camera {
 
     /// Direction (X/Z, Y/Z) that a pixel (u, v) looks along: the inverse of [`project`](Self::project) to about 1e-11.
     ///
-    /// `None` outside the metric radius and where the distortion cannot be inverted; the mask plays no role here.
+    /// `None` outside the metric radius and where the distortion cannot be inverted; the mask is ignored.
     pub fn unproject(&self, pixel: &Point2<f64>) -> Option<Vector2<f64>> {
         let CameraSpec { fx, fy, cx, cy, .. } = self.spec;
         let distorted = Vector2::new((pixel.x - cx) / fx, (pixel.y - cy) / fy);
@@ -90,8 +90,8 @@ impl Camera {
         self.distortion.undistort(&distorted)
     }
 
-    /// [`unproject`](Self::unproject) of every pixel centre, `None` outside the mask; row-major; computed on first use, then
-    /// kept.
+    /// [`unproject`](Self::unproject) of every pixel centre, `None` outside the mask; row-major; computed on first use and
+    /// cached.
     pub fn rays(&self) -> &[Option<Vector2<f64>>] {
         &self.optics().rays
     }

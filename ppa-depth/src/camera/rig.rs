@@ -11,7 +11,7 @@ use crate::camera::rigid::{isometry_from_rows, rows_from_isometry};
 use crate::camera::spec::{CameraError, CameraSpec};
 use crate::camera::viewpoint::looking_at;
 
-/// A camera and where it is mounted.
+/// A camera and its mounting pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MountedCamera {
@@ -34,7 +34,7 @@ pub struct RigSpec {
     pub right: MountedCamera,
 }
 
-/// Why a camera rig could not be read or makes no sense.
+/// Reason why a camera rig could not be read or is invalid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigError {
@@ -43,7 +43,7 @@ pub enum RigError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is not a rig JSON.
@@ -51,23 +51,23 @@ pub enum RigError {
     Json {
         /// The file.
         path: PathBuf,
-        /// What the parser said, with line and column.
+        /// Error of the parser, with line and column.
         source: serde_json::Error,
     },
-    /// A file describes a rig that makes no sense.
+    /// A file describes an invalid rig.
     #[error("{}", path.display())]
     Rig {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Cause.
         source: Box<RigError>,
     },
-    /// The intrinsics of one camera make no sense.
+    /// The intrinsics of one camera are invalid.
     #[error("{side} camera of the rig")]
     Camera {
         /// `left` or `right`.
         side: &'static str,
-        /// What is wrong.
+        /// Cause.
         source: CameraError,
     },
     /// The pose of one camera is not a rigid motion.
@@ -75,7 +75,7 @@ pub enum RigError {
     Pose {
         /// `left` or `right`.
         side: &'static str,
-        /// What is wrong.
+        /// Cause.
         source: RigidError,
     },
 }
@@ -143,7 +143,7 @@ impl RigSpec {
         Ok(rig)
     }
 
-    /// Whether both cameras make sense and sit at rigid poses.
+    /// Checks that both cameras are valid and their poses rigid.
     ///
     /// # Errors
     /// [`RigError::Camera`] or [`RigError::Pose`].

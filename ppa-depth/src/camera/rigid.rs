@@ -1,4 +1,4 @@
-//! Rigid motions as rows of a 4x4 matrix, the way files hold them.
+//! Rigid motions as rows of a 4x4 matrix, as stored in files.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use ppa_core::{RigidError, TransformRows, check_rigid};

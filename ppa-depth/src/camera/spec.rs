@@ -76,7 +76,7 @@ pub struct CameraSpec {
     pub mask: Option<FieldMask>,
 }
 
-/// Why a camera could not be read or makes no sense.
+/// Reason why a camera could not be read or is invalid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
@@ -85,7 +85,7 @@ pub enum CameraError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is not a camera JSON.
@@ -93,10 +93,10 @@ pub enum CameraError {
     Json {
         /// The file.
         path: PathBuf,
-        /// What the parser said, with line and column.
+        /// Error of the parser, with line and column.
         source: serde_json::Error,
     },
-    /// A calibration file lacks something or holds another kind of lens.
+    /// A calibration file is incomplete or describes another kind of lens.
     #[error("{} cannot be used as a depth camera: {message}", path.display())]
     Calibration {
         /// The file.
@@ -152,7 +152,7 @@ pub enum CameraError {
 }
 
 impl CameraSpec {
-    /// Most columns or rows of an image.
+    /// Largest number of columns or rows of an image.
     pub(crate) const MAX_SIDE: u32 = 16_384;
 
     /// A camera with OpenCV's rational lens: size in pixels, focal lengths and principal point, k1 to k6, p1 and p2.

@@ -3,15 +3,15 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Place of a camera seen from the point it looks at, in a frame whose z points up.
+/// Position of a camera relative to the point it looks at, in a frame whose z points up.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Viewpoint {
-    /// From the frame's x towards its y, degrees.
+    /// Angle from the frame's x towards its y, degrees.
     pub azimuth_deg: f64,
-    /// Above the horizontal, degrees: 90 is straight above.
+    /// Angle above the horizontal, degrees: 90 is straight above.
     pub elevation_deg: f64,
-    /// From the point to the camera, mm.
+    /// Distance from the point to the camera, mm.
     pub distance_mm: f64,
 }
 
@@ -26,7 +26,7 @@ impl Viewpoint {
         }
     }
 
-    /// Directions above `lowest_deg` about `step_deg` apart, at each of some distances; straight above is one of them.
+    /// Directions above `lowest_deg` about `step_deg` apart, at each of the distances; straight above is one of them.
     ///
     /// Rings of equal elevation, from above, with enough directions that they are no further apart than the rings; the first of
     /// each ring lies along x.
@@ -49,13 +49,13 @@ impl Viewpoint {
         distances_mm.iter().copied().flat_map(at).collect()
     }
 
-    /// Motion from a camera here that looks at `target` to the target's frame. Its rows are horizontal with what is higher on
-    /// top; straight above and below, the frame's y points up in the image.
+    /// Motion from a camera at this viewpoint that looks at `target` to the target's frame. Image rows are horizontal, with higher
+    /// points on top; straight above and below, the frame's y points up in the image.
     pub fn frame_from_camera(&self, target: &Point3<f64>) -> Isometry3<f64> {
         let (sin, cos) = self.elevation_deg.to_radians().sin_cos();
         let (across, along) = self.azimuth_deg.to_radians().sin_cos();
         let way = Vector3::new(cos * along, cos * across, sin);
-        // Within a thousandth of a degree of the vertical its rows could be anything.
+        // Within a thousandth of a degree of the vertical, its rows are undetermined.
         let down = if cos.abs() < 2e-5 {
             -Vector3::y()
         } else {

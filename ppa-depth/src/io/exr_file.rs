@@ -13,7 +13,7 @@ use ppa_core::whole_file;
 use crate::image::{DepthError, DepthImage};
 
 impl DepthImage {
-    /// Writes an OpenEXR file with one f32 channel `Z` in mm, 0 for nothing; whole or not at all.
+    /// Writes an OpenEXR file with one f32 channel `Z` in mm, 0 for nothing, atomically.
     ///
     /// # Errors
     /// [`DepthError::Write`] names the file; [`DepthError::Length`] for a buffer that does not fit the size.

@@ -20,7 +20,7 @@ fn name(colour: png::ColorType) -> &'static str {
 }
 
 impl DepthImage {
-    /// Writes a 16-bit grey PNG in whole millimetres, 0 for nothing; whole or not at all.
+    /// Writes a 16-bit grey PNG in whole millimetres, 0 for nothing, atomically.
     ///
     /// Returns the number of pixels too far for 16 bits (65.535 m), which are 0 in the file.
     ///
@@ -47,7 +47,7 @@ impl DepthImage {
         Ok(rounded.too_far)
     }
 
-    /// Writes a PNG of the size of this image from the bytes of its pixels, whole or not at all.
+    /// Writes a PNG of the size of this image from the bytes of its pixels, atomically.
     pub(crate) fn write_pixels(
         &self,
         path: &Path,
@@ -170,7 +170,7 @@ mod tests {
             DepthImage::read_png(&grey8),
             Err(DepthError::Read { .. })
         ));
-        // What a header claims is looked at before memory is asked for.
+        // The header is checked before memory is allocated.
         let wide = folder.path().join("wide.png");
         let mut encoder = png::Encoder::new(std::fs::File::create(&wide).unwrap(), 20_000, 1);
         encoder.set_depth(png::BitDepth::Sixteen);

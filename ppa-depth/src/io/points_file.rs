@@ -23,7 +23,7 @@ impl DepthImage {
             .collect())
     }
 
-    /// Writes [`points`](Self::points) as a binary PLY cloud; whole or not at all.
+    /// Writes [`points`](Self::points) as a binary PLY cloud, atomically.
     ///
     /// # Errors
     /// [`DepthError::Write`] names the file; [`DepthError::SizeMismatch`].

@@ -1,4 +1,4 @@
-//! A depth image to look at: false colour, 8 bits.
+//! Previews of depth images in false colour, 8 bits.
 
 use std::path::Path;
 

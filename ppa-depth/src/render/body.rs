@@ -14,7 +14,7 @@ pub enum Body {
     Surfels(SurfelBody),
 }
 
-/// A body and where it stands.
+/// A body and its pose.
 #[derive(Debug, Clone, Copy)]
 pub struct PlacedBody<'a> {
     /// The surface.
@@ -23,11 +23,11 @@ pub struct PlacedBody<'a> {
     pub camera_from_body: Isometry3<f64>,
 }
 
-/// Farthest that a body may be moved, mm.
+/// Largest distance that a body may be moved, mm.
 const FARTHEST_MM: f64 = 1e9;
 
 impl PlacedBody<'_> {
-    /// Whether the pose is made of numbers.
+    /// Whether the pose is finite and within [`FARTHEST_MM`].
     pub(crate) fn is_somewhere(&self) -> bool {
         let Isometry3 {
             rotation,

@@ -10,19 +10,19 @@ pub enum BodyError {
     /// A coordinate is infinite, NaN, or beyond 1e6 mm.
     #[error("point {index} is at ({}, {}, {}), expected finite coordinates within 1e6 mm", found[0], found[1], found[2])]
     Coordinate {
-        /// Which vertex or point.
+        /// Index of the vertex or point.
         index: usize,
         /// Its coordinates, mm.
         found: [f32; 3],
     },
-    /// A triangle names a vertex that does not exist.
+    /// A triangle refers to a vertex that does not exist.
     #[error("triangle {triangle} uses vertex {vertex}, but the number of vertices is {vertices}")]
     Vertex {
-        /// Which triangle.
+        /// Index of the triangle.
         triangle: usize,
-        /// The vertex it names.
+        /// Index of the vertex.
         vertex: u32,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// More primitives than the index can number.
@@ -39,7 +39,7 @@ pub enum BodyError {
     /// A normal has no direction.
     #[error("normal {index} is ({}, {}, {}), expected a vector with a direction", found[0], found[1], found[2])]
     Normal {
-        /// Which normal.
+        /// Index of the normal.
         index: usize,
         /// Its components.
         found: [f32; 3],
@@ -47,7 +47,7 @@ pub enum BodyError {
     /// A closed mesh surrounds the camera.
     #[error("the camera is inside the surface, at ({}, {}, {}) mm in its frame (check the pose)", eye[0], eye[1], eye[2])]
     CameraInside {
-        /// Where, in the frame of the body, mm.
+        /// Position of the camera in the frame of the body, mm.
         eye: [f64; 3],
     },
     /// A pose that is not finite or too far away.
@@ -61,7 +61,7 @@ pub enum BodyError {
 /// Largest coordinate of a body, mm: a kilometre.
 pub(crate) const MAX_COORDINATE_MM: f32 = 1e6;
 
-/// The largest coordinate, if all points are where a body can be.
+/// The largest absolute coordinate, if all points are within the allowed range.
 pub(crate) fn check_points(points: &[nalgebra::Point3<f32>]) -> Result<f32, BodyError> {
     // The bits of |x| are ordered as |x| is, with NaN on top, and their maximum is found in vector code.
     let bits = |point: &nalgebra::Point3<f32>| point.coords.map(|x| x.abs().to_bits()).max();

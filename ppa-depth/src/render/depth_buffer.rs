@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub(crate) struct DepthBuffer(Vec<AtomicU32>);
 
 impl DepthBuffer {
-    /// Nothing seen.
+    /// A buffer in which nothing was seen.
     pub(crate) fn empty(pixels: usize) -> Self {
         let far = f32::INFINITY.to_bits();
         Self((0..pixels).map(|_| AtomicU32::new(far)).collect())
@@ -19,7 +19,7 @@ impl DepthBuffer {
         f32::from_bits(self.0[pixel].load(Ordering::Relaxed))
     }
 
-    /// Keeps the nearer of what is there and `z_mm` > 0.
+    /// Keeps the nearer of the stored depth and `z_mm` > 0.
     #[inline]
     pub(crate) fn offer(&self, pixel: usize, z_mm: f32) {
         if z_mm < self.nearest(pixel) {

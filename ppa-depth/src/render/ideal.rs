@@ -21,7 +21,7 @@ pub fn render(camera: &Camera, bodies: &[PlacedBody]) -> DepthImage {
     draw(camera, &SeenBody::all(camera, bodies))
 }
 
-/// A body from the camera's place.
+/// A body as seen from the camera.
 pub(crate) enum SeenBody<'a> {
     Mesh(SeenMesh<'a>),
     Surfels(SeenSurfels<'a>),
@@ -96,7 +96,7 @@ fn image_of(camera: &Camera, buffer: DepthBuffer) -> DepthImage {
     }
 }
 
-/// Discs with the camera taken into their frame, so that one index serves any pose.
+/// Discs with the camera transformed into their frame, so that one index serves any pose.
 pub(crate) struct SeenSurfels<'a> {
     surfels: &'a SurfelBody,
     eye: Point3<f64>,

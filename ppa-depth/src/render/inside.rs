@@ -9,8 +9,8 @@ use crate::render::mesh_body::MeshBody;
 use crate::render::triangle::Triangle;
 
 impl PlacedBody<'_> {
-    /// Refuses a camera that stands inside a closed mesh: it would see the mesh from within. Walls close a mesh; open meshes and discs
-    /// have no inside.
+    /// Returns an error if the camera is inside a closed mesh: it would see the mesh from within. Walls close a mesh; open meshes and
+    /// discs have no inside.
     ///
     /// # Errors
     /// [`BodyError::CameraInside`]; [`BodyError::Pose`] for a pose that is not finite.
@@ -30,8 +30,8 @@ impl PlacedBody<'_> {
 }
 
 impl MeshBody {
-    /// Whether every ray from a point, along six directions, meets the mesh an odd number of times. It does not matter which way the
-    /// triangles are turned; a surface that one of the rays leaves through a hole has no inside.
+    /// Whether every ray from a point, along six directions, meets the mesh an odd number of times. The orientation of the
+    /// triangles does not matter; a surface that one of the rays leaves through a hole has no inside.
     fn encloses(&self, point: &Point3<f64>) -> bool {
         let [low, high] = &self.bounds;
         let within =

@@ -38,7 +38,7 @@ impl MeshBody {
     }
 
     /// The mesh with walls: triangles on its vertices that close it where its source was cut off, such as a limb by the
-    /// field of view of its scan. They hide what is behind them; [`render`](crate::render) draws them as any surface,
+    /// field of view of its scan. They hide what is behind them; [`render`](crate::render) draws them like any other surface,
     /// [`render_before`](crate::render_before) separates them from it.
     ///
     /// # Errors
@@ -52,7 +52,7 @@ impl MeshBody {
     }
 }
 
-/// Whether triangles name vertices that are there.
+/// Checks that triangles refer to existing vertices.
 fn check_corners(triangles: &[[u32; 3]], vertices: usize) -> Result<(), BodyError> {
     let missing = |corner: &u32| *corner as usize >= vertices;
     let corners = triangles.as_flattened();

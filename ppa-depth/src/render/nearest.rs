@@ -44,7 +44,7 @@ impl Index {
         }
     }
 
-    /// Smallest t below `limit` that `hit` reports for a primitive on the ray's way.
+    /// Smallest t below `limit` that `hit` reports for a primitive along the ray.
     pub(crate) fn nearest(
         &self,
         ray: &Ray,

@@ -22,10 +22,10 @@ use crate::render::triangle::Triangle;
 
 /// Relative error of a projection in single precision, some 20 roundings.
 const ROUNDING: f32 = 1e-5;
-/// Triangles or corners that a thread takes at a time.
+/// Number of triangles or corners per task.
 pub(crate) const CHUNK: usize = 1 << 14;
 
-/// Where in the image a triangle may be.
+/// Part of the image that a triangle may cover.
 pub(crate) enum Outline {
     /// Anywhere: it reaches behind the camera or far outside the image.
     Unknown,
@@ -37,9 +37,9 @@ pub(crate) enum Outline {
         rows: Range<u32>,
         /// Smallest and largest column of its corners.
         across: [f32; 2],
-        /// No part of it is further from a corner along either axis, pixels.
+        /// Upper bound of the distance of any part from a corner along either axis, pixels.
         extent: f32,
-        /// No part of it is nearer than this, mm.
+        /// Lower bound of its depth, mm.
         nearest: f32,
     },
 }
@@ -52,11 +52,11 @@ pub(crate) struct SeenMesh<'a> {
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
     pub(crate) corners: Vec<Corner>,
-    /// Largest extent of the triangles of each chunk in the image, known once they were drawn.
+    /// Largest extent of the triangles of each chunk in the image, known after drawing.
     pub(crate) extents: OnceLock<Vec<f32>>,
-    /// By which single precision may misplace a corner in space.
+    /// Bound of the error of a corner in space from single precision.
     rounding_mm: f32,
-    /// By which it may misplace a corner in the image, on top of that.
+    /// Bound of the additional error of a corner in the image.
     rounding_px: f32,
 }
 
@@ -147,7 +147,7 @@ impl<'a> SeenMesh<'a> {
         }
     }
 
-    /// Returns how far in the image a part of the triangle may lie from a corner, pixels; ∞ if there is no telling.
+    /// Returns how far in the image a part of the triangle may be from a corner, pixels; ∞ if unknown.
     #[inline]
     fn draw_triangle(&self, triangle: &[u32; 3], buffer: &DepthBuffer) -> f32 {
         let Outline::Within {
@@ -165,7 +165,7 @@ impl<'a> SeenMesh<'a> {
             self.draw_anywhere(triangle, buffer, rays);
             return f32::INFINITY;
         };
-        // One branch, since most triangles hold no centre, but many a column or a row of centres.
+        // One branch, since most triangles contain no centre, but many a column or a row of centres.
         if columns.is_empty() | rows.is_empty() {
             return extent;
         }
@@ -188,7 +188,7 @@ impl<'a> SeenMesh<'a> {
         extent
     }
 
-    /// A triangle that cannot be projected as a whole, because it is large and reaches behind the camera or far outside.
+    /// Draws a triangle that cannot be projected as a whole, because it is large and reaches behind the camera or far outside.
     pub(crate) fn draw_anywhere(
         &self,
         triangle: &[u32; 3],
@@ -229,7 +229,7 @@ impl<'a> SeenMesh<'a> {
     }
 }
 
-/// Largest number that makes up a place in the image: its size, or the principal point of a part of a larger image.
+/// Largest number in the computation of a place in the image: its size, or the principal point of a part of a larger image.
 fn largest_pixel(camera: &Camera, optics: &Optics) -> f32 {
     let (spec, size) = (camera.spec(), camera.width().max(camera.height()));
     let centre = spec.cx.abs().max(spec.cy.abs());

@@ -8,13 +8,13 @@ use crate::render::raster::{CHUNK, Outline, SeenMesh, centres, misses};
 use crate::render::sampled::{SAMPLES, Sites};
 use crate::render::single_lens::Corner;
 
-/// How far the rays of samples may lie beside their place in the image, pixels.
+/// Largest distance of the rays of samples from their place in the image, pixels.
 const SAMPLE_SLACK_PX: f32 = 0.005;
 
 impl SeenMesh<'_> {
     /// Offers the depth of every triangle at all samples of the sites it covers.
     ///
-    /// Few pixels are sites. Where all triangles of a chunk are small, a look at one corner shows that a triangle is near none.
+    /// Few pixels are sites. If all triangles of a chunk are small, one corner suffices to show that a triangle is near none.
     pub(crate) fn draw_samples(&self, sites: &Sites) {
         let is_near = |corner: &Corner| sites.is_near(&Point2::new(corner[0], corner[1]));
         let mut near = vec![false; self.corners.len()];

@@ -12,7 +12,7 @@ use crate::render::walls::{WallDepth, WalledImage, is_first, seen_before};
 /// Samples per pixel at an edge.
 pub(crate) const SAMPLES: usize = 8;
 
-/// Where they lie from the pixel's centre, in pixels: one in each of eight columns and rows.
+/// Offsets of the samples from the pixel's centre, in pixels: one in each of eight columns and rows.
 const OFFSETS: [[f64; 2]; SAMPLES] = {
     let rows = [3.0, 6.0, 1.0, 4.0, 7.0, 0.0, 5.0, 2.0];
     let mut offsets = [[0.0; 2]; SAMPLES];
@@ -78,7 +78,7 @@ impl Site {
     }
 }
 
-/// Which pixels are sampled, and what has been seen there.
+/// The sampled pixels, and the depths seen there.
 pub(crate) struct Sites {
     pub sites: Vec<Site>,
     /// Site of each pixel, `u32::MAX` for none.
@@ -120,10 +120,10 @@ impl Sites {
     /// Points this close to the centre of a site along both axes are near it, pixels.
     pub(crate) const NEAR_PX: f32 = 1.5;
 
-    /// Whether a place in the image, or the place on its border nearest to one beside it, is near a site.
+    /// Whether a place in the image, or the nearest place on its border for one outside, is near a site.
     #[inline]
     pub(crate) fn is_near(&self, at: &Point2<f32>) -> bool {
-        // Conversion takes what is below 0 to 0.
+        // Conversion maps negative values to 0.
         let column = ((at.x + 0.5) as u32).min(self.width - 1) as usize;
         let last = self.near.len() - self.width as usize;
         let row = ((at.y + 0.5) as usize).saturating_mul(self.width as usize);
@@ -172,7 +172,7 @@ impl Sites {
 }
 
 impl Backdrop {
-    /// Renders the static scene. Takes a while: every pixel is sampled.
+    /// Renders the static scene. This is slow: every pixel is sampled.
     pub fn new(camera: &Camera, bodies: &[PlacedBody]) -> Self {
         let pixels = camera.rays().len();
         let sites = Sites::new(camera, 0..pixels as u32);
@@ -203,11 +203,11 @@ impl Backdrop {
         self.before_with_walls(camera, bodies, WallDepth::Flat)
     }
 
-    /// [`before`](Self::before), where `walls` says what becomes of the bodies' walls. If they are to be invalid, a pixel has no depth if its centre
-    /// or, at an edge, any of its samples sees a wall; walls send no light to other pixels either.
+    /// The same as [`before`](Self::before), where `walls` sets how the bodies' walls are treated. If they are invalid, a pixel has no
+    /// depth if its centre or, at an edge, any of its samples sees a wall; walls send no light to other pixels either.
     ///
     /// # Errors
-    /// As [`before`](Self::before).
+    /// The same as [`before`](Self::before).
     pub fn before_with_walls(
         &self,
         camera: &Camera,

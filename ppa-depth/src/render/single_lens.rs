@@ -10,10 +10,10 @@ pub(crate) type Corner = [f32; 3];
 /// Points that are projected at a time.
 pub(crate) const LANES: usize = 8;
 
-/// From the body to the camera, in single precision.
+/// Motion from the body to the camera, in single precision.
 pub(crate) struct Motion {
     pub rotation: Matrix3<f32>,
-    /// mm.
+    /// Translation, mm.
     pub translation: Vector3<f32>,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct SingleLens {
 }
 
 impl SingleLens {
-    /// `radius`: of the disc √((X/Z)² + (Y/Z)²).
+    /// `radius` is that of the disc √((X/Z)² + (Y/Z)²).
     pub(crate) fn new(spec: &CameraSpec, radius: f64) -> Self {
         let single = |values: [f64; 3]| values.map(|value| value as f32);
         Self {

@@ -26,11 +26,11 @@ impl<'a> Surface<'a> {
         (z_mm > 0.0).then(|| Point3::new(ray.x * z, ray.y * z, z))
     }
 
-    /// The next pixel `step` indices away, if it lies on the same surface, however steep that is. There are `ahead` pixels that
-    /// way and `behind` the other way.
+    /// The next pixel `step` indices away, if it is on the same surface, however steep that is. There are `ahead` pixels in that
+    /// direction and `behind` in the opposite one.
     ///
-    /// 1/z of a plane is linear in the image of a pinhole, so that of three pixels in a row it has no second difference, where a step of
-    /// h makes h / z². The third may be the one before the two or the one behind them.
+    /// 1/z of a plane is linear in the image of a pinhole, so its second difference over three pixels in a row vanishes, whereas a step
+    /// of h gives h / z². The third pixel may be before or after the two.
     #[inline(always)]
     fn next(&self, pixel: usize, step: isize, ahead: usize, behind: usize) -> Option<Point3<f64>> {
         let z_mm = &self.image.z_mm;
@@ -82,7 +82,7 @@ impl<'a> Surface<'a> {
         Some(normal * -normal.dot(&here.coords).signum())
     }
 
-    /// A vector across the surface at the point that a pixel sees, to either side and of any length.
+    /// A vector normal to the surface at the point that a pixel sees, of either sign and any length.
     #[inline(always)]
     fn across(&self, pixel: usize, here: Point3<f64>) -> Option<Vector3<f64>> {
         let across = |behind: Option<Point3<f64>>, ahead: Option<Point3<f64>>| match (behind, ahead)
@@ -131,7 +131,7 @@ impl<'a> Surface<'a> {
         best
     }
 
-    /// Cosine of the angle of incidence; 1 where there is no telling.
+    /// Cosine of the angle of incidence; 1 if unknown.
     #[inline]
     pub(crate) fn cos_incidence(&self, pixel: usize) -> f64 {
         let Some(point) = self.point(pixel) else {
@@ -150,7 +150,7 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// Signal of a diffuse surface relative to one seen square on at 1 m.
+/// Signal of a diffuse surface relative to one at normal incidence at 1 m.
 #[inline]
 pub(crate) fn signal(cos_incidence: f64, range_mm: f64) -> f64 {
     cos_incidence * 1e6 / (range_mm * range_mm)

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::render::body_error::{BodyError, MAX_COORDINATE_MM, check_count, check_points};
 use crate::render::nearest::{Index, Ray};
 
-/// A cloud of equal discs, one around each point and square to its normal, in its own frame, mm.
+/// A cloud of equal discs, one around each point and perpendicular to its normal, in its own frame, mm.
 ///
 /// A surface sampled at distance g shows no holes once the radius reaches g/√2 for a square grid, and about 1.5 g for
 /// scattered points whose mean distance is g. Larger discs are safe on flat parts, but stick out at convex edges.

@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 pub(crate) struct Triangle {
     edges: [Vector3<f64>; 3],
     normal: Vector3<f64>,
-    /// Of the triangle's plane from the origin, times the length of `normal`.
+    /// Distance of the triangle's plane from the origin, times the length of `normal`.
     distance: f64,
     /// Smallest and largest depth of its corners, a little widened.
     range: [f64; 2],
@@ -55,7 +55,7 @@ impl Triangle {
             return None; // seen edge-on, or without area: its neighbours cover it
         }
         let z = self.distance / slope;
-        // Exactly edge-on, distance and slope are both nothing but rounding.
+        // Exactly edge-on, distance and slope are both rounding errors.
         let [low, high] = self.range;
         (z > 0.0 && low <= z && z <= high).then_some(z)
     }

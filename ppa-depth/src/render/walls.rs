@@ -7,14 +7,14 @@ use crate::image::{DepthError, DepthImage};
 use crate::render::body::PlacedBody;
 use crate::render::ideal::{SeenBody, draw_open, draw_walls};
 
-/// What a depth image holds where a wall is the nearest surface. Nobody knows what stood there before the cut.
+/// Depth where a wall is the nearest surface. What was there before the cut is unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WallDepth {
     /// 0: no depth, and no light for a sensor.
     #[default]
     Invalid,
-    /// The depth of the wall, as of any surface.
+    /// The depth of the wall, like that of any surface.
     Flat,
 }
 
@@ -27,11 +27,11 @@ pub struct WalledImage {
     pub wall_pixels: Vec<u32>,
 }
 
-/// The bodies before a background of the same camera, which was rendered once; `walls` says what becomes of their
-/// walls. Walls hide what is behind them, background included, whatever they become.
+/// Renders bodies in front of a background of the same camera, which was rendered once; `walls` sets how their walls are
+/// treated. Walls hide what is behind them, background included, in either case.
 ///
 /// # Errors
-/// As [`DepthImage::before`]; walls count as part of the bodies.
+/// The same as [`DepthImage::before`]; walls count as part of the bodies.
 pub fn render_before(
     camera: &Camera,
     bodies: &[PlacedBody],
@@ -71,7 +71,7 @@ pub(crate) fn seen_before(
     Ok(WalledImage { image, wall_pixels })
 }
 
-/// Whether a wall is seen, and nearer than what else is seen; 0 is nothing.
+/// Whether a wall is seen and is nearer than any other surface; 0 is nothing.
 pub(crate) fn is_first(wall: f32, other: f32) -> bool {
     wall > 0.0 && (other == 0.0 || wall < other)
 }

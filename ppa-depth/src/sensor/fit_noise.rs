@@ -5,16 +5,16 @@ use crate::image::{DepthError, DepthImage};
 use crate::render::surface::{Surface, signal};
 use crate::sensor::spec::RandomError;
 
-/// What a recording says about the random error, and what is left to it.
+/// Random error fitted to a recording, and quality of the fit.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct NoiseFit {
     /// Fitted parameters.
     pub random: RandomError,
     /// Signal below which pixels are lost in more than half of the frames; `None` if the recording has no such pixels.
     pub min_signal: Option<f64>,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Pixels that the fit rests on.
+    /// Number of pixels used in the fit.
     pub pixels: usize,
     /// Root mean square of (measured − fitted) / fitted standard deviation, over the classes of signal.
     pub relative_misfit: f64,
@@ -29,18 +29,18 @@ pub enum FitError {
     /// Too few frames.
     #[error("{0} frames, expected at least 3 of a static scene")]
     Frames(usize),
-    /// Frames of different size, or not of the camera's.
+    /// A frame is not of the size of the camera's images.
     #[error("frame {frame}")]
     Size {
-        /// Which frame, from 0.
+        /// Index of the frame, from 0.
         frame: usize,
-        /// The sizes.
+        /// Error with both sizes.
         source: DepthError,
     },
     /// Too few pixels see a surface.
     #[error("{0} pixels see a surface in every frame, expected at least 1000")]
     Pixels(usize),
-    /// The noise is too small to be seen.
+    /// The noise is too small to be measured.
     #[error(
         "the depths vary enough to be distinguished from rounding in only {0} of 20 signal classes, expected at least 4: record surfaces further away"
     )]
@@ -54,16 +54,16 @@ pub enum FitError {
 
 /// Classes of equal size, by signal.
 const CLASSES: usize = 20;
-/// Classes that a fit of two numbers needs.
+/// Smallest number of classes for a fit of two parameters.
 const LEAST_CLASSES: usize = 4;
 /// Variance of rounding to whole millimetres, mm².
 const ROUNDING_MM2: f64 = 1.0 / 12.0;
 
 /// Fits variance = floor² + (at_unit_signal / S)² to the spread of every pixel over the frames of a still scene.
 ///
-/// `whole_mm`: the frames were rounded to millimetres, as 16-bit PNGs are; the variance of rounding is then taken off. Pixels at
-/// edges are left out, since they mix surfaces. The signal is that of diffuse surfaces of one reflectivity. Offsets that stay
-/// with the device cannot be found from such a recording.
+/// `whole_mm`: the frames were rounded to millimetres, as 16-bit PNGs are; the variance of rounding is then subtracted. Pixels at
+/// edges are excluded, since they mix surfaces. The signal is that of diffuse surfaces of one reflectivity. Constant offsets of
+/// the device cannot be found from such a recording.
 ///
 /// # Errors
 /// [`FitError`] for too few frames, pixels or too little variety, or frames that are not the camera's.
@@ -130,7 +130,7 @@ pub fn fit_noise(
         let mean = |value: fn(&(f64, f64)) -> f64| points.iter().map(value).sum::<f64>() / n;
         (mean(|p| p.0.powi(-2)), mean(|p| p.1))
     };
-    // Rounding hides what is smaller than itself: such classes say nothing.
+    // Rounding hides smaller variances: such classes carry no information.
     let least = if whole_mm { ROUNDING_MM2 } else { 0.0 };
     let classes: Vec<_> = measured
         .chunks(always.div_ceil(CLASSES))
@@ -160,7 +160,7 @@ pub fn fit_noise(
     })
 }
 
-/// Least squares of y = a + b x with weights 1/y², since the spread of a variance is proportional to it; neither below 0.
+/// Least squares of y = a + b x with weights 1/y², since the spread of a variance is proportional to it; a and b are at least 0.
 fn line(points: &[(f64, f64)]) -> (f64, f64) {
     let weight = |y: f64| 1.0 / y.max(1e-6).powi(2);
     let sum = |value: &dyn Fn(f64, f64) -> f64| {

@@ -1,4 +1,4 @@
-//! Light that reaches a pixel by way of another surface.
+//! Light that reaches a pixel via another surface.
 
 use nalgebra::{Complex, Point3, Vector3};
 use rayon::prelude::*;
@@ -24,8 +24,8 @@ struct Patch {
 ///
 /// Diffuse surfaces of one albedo ρ, lamp and lens at one place. A patch q of area A_q that receives S_q sends to p, before its
 /// cosine law at p, ρ S_q cos θ_q cos θ_p A_q / (π d²), over a way that is longer than the direct one by (r_q + d − r_p) / 2
-/// in range. Patches are the surfaces of tiles of 16 x 16 pixels; nothing is taken to stand between them, and what the camera does
-/// not see sends nothing.
+/// in range. Patches are the surfaces of tiles of 16 x 16 pixels; occlusion between them is ignored, and surfaces that the camera
+/// does not see send nothing.
 pub(crate) fn one_bounce(
     surface: &Surface,
     image: &DepthImage,
@@ -48,7 +48,7 @@ pub(crate) fn one_bounce(
             let way = patch.point - point;
             let squared = way.norm_squared();
             let (to_patch, to_pixel) = (normal.dot(&way), -patch.normal.dot(&way));
-            // Closer than its own size a patch is no point.
+            // Closer than its own size, a patch cannot be treated as a point.
             if to_patch <= 0.0 || to_pixel <= 0.0 || squared < patch.area_mm2 {
                 continue;
             }

@@ -12,7 +12,7 @@ use crate::sensor::multipath::one_bounce;
 use crate::sensor::random::{Purpose, normals};
 use crate::sensor::spec::{SensorError, SensorSpec};
 
-/// One device: errors that stay with it are drawn when it is made.
+/// One device: its constant errors are drawn when it is created.
 #[derive(Debug, Clone)]
 pub struct Sensor {
     spec: SensorSpec,
@@ -31,7 +31,7 @@ struct Light {
 }
 
 impl Sensor {
-    /// The device that `device_seed` stands for.
+    /// Creates the device given by `device_seed`.
     ///
     /// # Errors
     /// [`SensorError`] for a number out of range.
@@ -51,13 +51,13 @@ impl Sensor {
         })
     }
 
-    /// What the sensor was made from.
+    /// Parameters of the sensor.
     pub fn spec(&self) -> &SensorSpec {
         &self.spec
     }
 
-    /// The depth image that the sensor gives in one frame. Random numbers are addressed by (seed, frame, pixel): the same for any
-    /// number of threads.
+    /// The depth image that the sensor measures in one frame. Random numbers are addressed by (seed, frame, pixel), so the image is
+    /// the same for any number of threads.
     ///
     /// # Errors
     /// [`DepthError::OtherCamera`] if `seen` is not of the size of `camera`'s images.
@@ -146,7 +146,7 @@ impl Sensor {
         (noise.unwrap_or_default(), pattern.unwrap_or_default())
     }
 
-    /// Direct light of a pixel, whose ray (X/Z, Y/Z, 1) is so long.
+    /// Direct light of a pixel; `ray` is the length of its ray (X/Z, Y/Z, 1).
     fn light(
         &self,
         surface: &Surface,
@@ -191,7 +191,7 @@ impl Sensor {
         Some(light)
     }
 
-    /// Range and signal that the light makes, `None` if the pixel is given up.
+    /// Range and signal of the light; `None` if the pixel is rejected.
     fn range(
         &self,
         light: Light,

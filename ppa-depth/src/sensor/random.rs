@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use ppa_core::random::{Philox, philox};
 
-/// What numbers are for. Part of the contract that seeds give the same images: append, never renumber.
+/// Purposes of random numbers. Part of the contract that seeds give the same images: append, never renumber.
 #[derive(Debug, Clone, Copy)]
 #[repr(u32)]
 pub(crate) enum Purpose {

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Errors of an amplitude-modulated Time-of-Flight camera. An error that is left out is not simulated.
+/// Errors of an amplitude-modulated Time-of-Flight camera. Omitted errors are not simulated.
 ///
-/// Signal S is relative to that of the reference target seen square on at 1 m: S = cos θ / (r / 1 m)², θ the angle of incidence, r the
-/// range along the ray. [`SensorSpec::default`] is not a device: it is what published limits allow (see there). Only
+/// Signal S is relative to that of the reference target at normal incidence at 1 m: S = cos θ / (r / 1 m)², θ the angle of incidence,
+/// r the range along the ray. [`SensorSpec::default`] is not a device: it follows published limits (see there). Only
 /// [`fit_noise`](crate::fit_noise) ties it to one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -13,7 +13,7 @@ pub struct SensorSpec {
     /// Error that changes from frame to frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub random: Option<RandomError>,
-    /// Error that stays with the device.
+    /// Constant error of the device.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub systematic: Option<SystematicError>,
     /// Pixels at edges that see several surfaces.
@@ -22,7 +22,7 @@ pub struct SensorSpec {
     /// Pixels that the device marks invalid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub invalid: Option<Invalidation>,
-    /// Light that returns by way of another surface.
+    /// Light that returns via another surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub multipath: Option<Multipath>,
 }
@@ -31,7 +31,7 @@ pub struct SensorSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RandomError {
-    /// Standard deviation that remains however strong the signal, mm.
+    /// Standard deviation that remains at any signal, mm.
     pub floor_mm: f64,
     /// Standard deviation at S = 1, mm.
     pub at_unit_signal_mm: f64,
@@ -71,8 +71,8 @@ pub struct Invalidation {
 
 /// One bounce between diffuse surfaces that the camera sees.
 ///
-/// Limits: nothing is taken to stand between two surfaces that face each other, so light also passes where the limb would block
-/// it, and what the camera does not see, such as the underside of the limb, sends nothing.
+/// Limits: occlusion between two surfaces that face each other is ignored, so light also passes where the limb would block
+/// it; surfaces that the camera does not see, such as the underside of the limb, send nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Multipath {
@@ -82,7 +82,7 @@ pub struct Multipath {
     pub modulation_mhz: f64,
 }
 
-/// Why the errors of a sensor make no sense.
+/// Reason why the errors of a sensor are invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SensorError {
@@ -102,13 +102,13 @@ impl Default for SensorSpec {
     /// Within the limits that the maker states for the Azure Kinect and Tölgyessy et al. confirm (Sensors 2021, 21, 413,
     /// doi:10.3390/s21020413): a standard deviation of at most 17 mm and an error below 11 mm (+ 0.1 % of the range).
     ///
-    /// * Random: 17 mm at the far end of the narrow mode, 3.86 m, taken back to 1 m with the signal: 17 / 3.86² = 1.14 mm.
+    /// * Random: 17 mm at the far end of the narrow mode, 3.86 m, scaled to 1 m with the signal: 17 / 3.86² = 1.14 mm.
     /// * Systematic: the limits as two standard deviations of offset and slope.
     /// * Signal: that of the reference target at 3.86 m, 1 / 3.86².
     /// * Modulation at 200 MHz (the sensor goes up to 320 MHz: Bamji et al., ISSCC 2018), least contrast 0.9, largest angle
-    ///   85°: choices of ours. An even mix of surfaces 0.11 m apart is then just given up.
+    ///   85°: our choices. An even mix of surfaces 0.11 m apart is then just rejected.
     ///
-    /// Multipath is left out.
+    /// Multipath is not included.
     fn default() -> Self {
         Self {
             random: Some(RandomError {
@@ -134,7 +134,7 @@ impl Default for SensorSpec {
 }
 
 impl SensorSpec {
-    /// Whether all numbers are in range.
+    /// Checks that all numbers are in range.
     ///
     /// # Errors
     /// [`SensorError`] names the first that is not.

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use crate::sensor::random::{Purpose, normals};
 use crate::sensor::spec::SensorError;
 
-/// How a limb that is held still moves nevertheless: normal translations and rotations about a point, correlated in time.
+/// Residual motion of a limb held still: normally distributed translations and rotations about a point, correlated in time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tremor {
     /// Standard deviation of the shift along each axis, mm.
     pub shift_mm: f64,
-    /// Standard deviation of the turn about each axis, degrees.
+    /// Standard deviation of the rotation about each axis, degrees.
     pub turn_deg: f64,
     /// Frames after which the correlation has fallen to e⁻¹.
     pub correlation_frames: f64,
@@ -22,10 +22,10 @@ pub struct Tremor {
 const LONGEST_FRAMES: f64 = 1e4;
 
 impl Tremor {
-    /// Whether its numbers make sense.
+    /// Checks that the numbers are in range.
     ///
     /// # Errors
-    /// [`SensorError`] names the first that does not.
+    /// [`SensorError`] names the first that is not.
     pub fn check(&self) -> Result<(), SensorError> {
         for (name, found, most, expected) in [
             ("tremor.shift_mm", self.shift_mm, 1e6, "0 to 1e6 mm"),
@@ -48,8 +48,8 @@ impl Tremor {
         Ok(())
     }
 
-    /// Motion in one frame, about `pivot` and in its frame; the same whatever frames were asked for before. For numbers that
-    /// [`check`](Self::check) accepts.
+    /// Motion in one frame, about `pivot` and in its frame; independent of the frames requested before. The numbers must pass
+    /// [`check`](Self::check).
     ///
     /// Independent normal numbers of all frames are weighted with a Gaussian around this one, whose squares sum to 1. Two
     /// frames k apart then correlate as exp(−k² / τ²), τ the correlation length.
@@ -64,7 +64,7 @@ impl Tremor {
             } else {
                 1.0
             };
-            // Frames before the first have addresses too: those at the end.
+            // Frames before the first wrap around to those at the end.
             let index = frame.wrapping_add_signed(k);
             let [x, y, z, _] = normals(seed, Purpose::Tremor, index, 0);
             let [p, q, r, _] = normals(seed, Purpose::Tremor, index, 1);

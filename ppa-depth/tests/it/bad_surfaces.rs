@@ -1,4 +1,4 @@
-//! Surfaces that are none, and cameras inside them.
+//! Invalid surfaces, and cameras inside surfaces.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_depth::{Body, BodyError, MeshBody, PlacedBody, SurfelBody, render};
@@ -6,7 +6,7 @@ use ppa_depth::{Body, BodyError, MeshBody, PlacedBody, SurfelBody, render};
 use crate::cameras::pinhole;
 use crate::shapes::bumpy;
 
-/// Recordings hold repeated points and meshes triangles without area; neither may break the index.
+/// Recordings contain repeated points and meshes triangles without area; neither may break the index.
 #[test]
 fn repeated_points_and_flat_triangles_do_no_harm() {
     let points = vec![Point3::new(0.0, 0.0, 500.0); 20_000];
@@ -100,7 +100,7 @@ fn a_camera_inside_a_closed_mesh_is_refused() {
     assert!(placed.require_camera_outside().is_ok());
 }
 
-/// Neither a triangle of numbers that are none nor all of them are tried at every pixel, which would take minutes.
+/// Triangles with invalid numbers are not tested at every pixel, which would take minutes.
 #[test]
 fn a_pose_that_is_no_pose_shows_nothing_and_is_refused() {
     let (vertices, triangles) = bumpy(7);
@@ -119,7 +119,7 @@ fn a_pose_that_is_no_pose_shows_nothing_and_is_refused() {
     }
 }
 
-/// A corner at the eye lies anywhere in the image.
+/// A corner at the eye may be anywhere in the image.
 #[test]
 fn a_corner_at_the_eye_does_no_harm() {
     let corners = [

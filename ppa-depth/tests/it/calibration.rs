@@ -1,4 +1,4 @@
-//! The same camera from the files of several makers, and its depth modes.
+//! The same camera from the files of several manufacturers, and its depth modes.
 
 use nalgebra::{Point2, Point3};
 use ppa_depth::{Camera, CameraError, CameraModel, CameraSpec, DepthMode};
@@ -44,7 +44,7 @@ fn import(name: &str, text: &str, mode: DepthMode) -> Result<CameraSpec, CameraE
     CameraSpec::import(&path, mode)
 }
 
-/// Both describe one camera at points all over its field.
+/// Checks that both describe one camera at points all over its field.
 fn same_camera(a: &CameraSpec, b: &CameraSpec) {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let [a, b] = [a, b].map(|spec| Camera::try_from(spec.clone()).unwrap());

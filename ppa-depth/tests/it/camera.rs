@@ -86,7 +86,7 @@ fn the_models_differ_by_the_factor_on_the_mixed_terms() {
 }
 
 proptest! {
-    /// Every pixel that has a ray is the projection of that ray; those without lie outside the metric radius.
+    /// Every pixel that has a ray is the projection of that ray; those without are outside the metric radius.
     #[test]
     fn pixels_survive_the_way_there_and_back(u in -0.5..511.5_f64, v in -0.5..511.5_f64, wide: bool, z_mm in 1.0..1e4_f64) {
         let spec = if wide { CameraSpec::azure_kinect(DepthMode::WfovBinned) } else { CameraSpec::azure_kinect(DepthMode::NfovUnbinned) };
@@ -210,7 +210,7 @@ fn a_camera_file_needs_only_what_matters() {
     ));
 }
 
-/// Each pose of a limb may be drawn by another thread, with rays that nobody asked for before.
+/// Each pose of a limb may be drawn by another thread, with rays not requested before.
 #[test]
 fn threads_that_draw_at_once_share_the_rays() {
     let threads = rayon::ThreadPoolBuilder::new()

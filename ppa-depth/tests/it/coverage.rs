@@ -1,4 +1,4 @@
-//! How much of a surface a camera sees, against spheres and planes.
+//! Coverage of surfaces, against spheres and planes.
 
 use std::f64::consts::PI;
 
@@ -152,7 +152,7 @@ fn nearer_cameras_see_more_finely_and_further_ones_more() {
     let (near, far, further) = (from(300.0), from(600.0), from(601.0));
     assert!(near.pixels_per_cm2 > 2.0 * far.pixels_per_cm2);
     assert!(far.visible_mm2 > 1.1 * near.visible_mm2);
-    // More of the surface comes first; of views that show as much, the finer.
+    // Views that show more of the surface come first; of equal ones, the finer.
     let mut views = [near, further, far];
     views.sort_by(ppa_depth::Coverage::best_first);
     assert_eq!(views, [far, further, near]);

@@ -1,4 +1,4 @@
-//! The depth camera against answers that can be derived.
+//! The depth camera against derived answers.
 
 mod bad_surfaces;
 mod calibration;

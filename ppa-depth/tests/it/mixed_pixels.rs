@@ -40,7 +40,7 @@ fn a_pixel_that_sees_two_walls_has_the_phase_of_their_light() {
         at(&image, 60),
         range / length
     );
-    // Its contrast decides whether it is given up.
+    // Its contrast decides whether it is rejected.
     let contrast = (a + b * turn.cos()).hypot(b * turn.sin()) / (a + b);
     for (limit, given_up) in [(contrast - 0.005, false), (contrast + 0.005, true)] {
         let spec = SensorSpec {
@@ -57,8 +57,8 @@ fn a_pixel_that_sees_two_walls_has_the_phase_of_their_light() {
     }
 }
 
-/// Where all triangles are small, only those near sites are looked at more closely; a triangle behind the camera in every chunk
-/// makes all of them be looked at. Both see the same.
+/// If all triangles are small, only those near sites are examined further; a triangle behind the camera in every chunk
+/// causes all of them to be examined. Both give the same image.
 #[test]
 fn triangles_that_are_skipped_would_not_have_been_seen() {
     let camera = Camera::try_from(pinhole(160, 500.0)).unwrap();

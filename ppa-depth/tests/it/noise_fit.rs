@@ -1,4 +1,4 @@
-//! The noise of recordings that the sensor model made, found again.
+//! Recovery of the noise of recordings simulated by the sensor model.
 
 use nalgebra::Point3;
 use ppa_depth::{
@@ -16,7 +16,7 @@ fn tilted_wall(camera: &Camera) -> SampledImage {
     view(camera, &[], &body)
 }
 
-/// What is put in comes out, rounding to millimetres included.
+/// The simulated noise is recovered, rounding to millimetres included.
 #[test]
 fn the_noise_of_a_recording_is_found_again() {
     let camera = Camera::try_from(pinhole(160, 120.0)).unwrap();
@@ -69,7 +69,7 @@ fn the_noise_of_a_recording_is_found_again() {
     ));
 }
 
-/// Pixels that are given up below a signal are missing in every frame; the signals of a class of pixels are some 5 % apart.
+/// Pixels that are rejected below a signal are missing in every frame; the signals of a class of pixels are some 5 % apart.
 #[test]
 fn the_least_signal_of_a_recording_is_found_again() {
     let camera = Camera::try_from(pinhole(160, 120.0)).unwrap();

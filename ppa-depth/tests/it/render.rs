@@ -24,7 +24,7 @@ fn sphere_depth(x: f64, y: f64, centre: &Vector3<f64>, radius: f64) -> Option<f6
 }
 
 /// The facets lie between the sphere and one of the facets' smallest distance, so the depth lies between the depths of
-/// those two: exact at every pixel, also at grazing ones. The mesh is turned so that body and camera frames differ.
+/// those two: exact at every pixel, also at grazing ones. The mesh is rotated so that body and camera frames differ.
 #[test]
 fn a_sphere_has_its_analytic_depth_through_the_distortion() {
     let (vertices, triangles, inner_mm) = sphere(180.0, 6);
@@ -83,7 +83,7 @@ fn what_is_nearer_hides_what_is_behind_in_any_order() {
     assert_eq!(both, render(&camera, &[ball, wall]));
     let (only_ball, only_wall) = (render(&camera, &[ball]), render(&camera, &[wall]));
     assert_eq!(both, DepthImage::nearer_of(&only_ball, &only_wall).unwrap());
-    // The ball sticks out of the wall: its rim is behind, its front before the wall.
+    // The ball sticks out of the wall: its rim is behind the wall, its front before it.
     assert!(
         both.z_mm
             .iter()
@@ -96,7 +96,7 @@ fn what_is_nearer_hides_what_is_behind_in_any_order() {
             .zip(&only_ball.z_mm)
             .any(|(both, ball)| *ball > 0.0 && both < ball)
     );
-    // What is behind the camera is not seen.
+    // A body behind the camera is not seen.
     let behind = PlacedBody {
         camera_from_body: Isometry3::translation(0.0, 0.0, -900.0),
         ..ball

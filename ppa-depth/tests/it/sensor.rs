@@ -1,4 +1,4 @@
-//! What the sensor model makes of scenes whose answer can be derived.
+//! The sensor model on scenes whose answer can be derived.
 
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::{
@@ -40,7 +40,7 @@ pub fn pinhole(side: u32, focal: f64) -> CameraSpec {
     }
 }
 
-/// A rectangle from (x0, −9 m) to (x1, 9 m), square to the axis at depth `z_mm`.
+/// A rectangle from (x0, −9 m) to (x1, 9 m), perpendicular to the axis at depth `z_mm`.
 pub fn wall(x0: f32, x1: f32, z_mm: f32) -> Body {
     let corners =
         [(x0, -9e3), (x1, -9e3), (x1, 9e3), (x0, 9e3)].map(|(x, y)| Point3::new(x, y, z_mm));
@@ -121,7 +121,7 @@ fn the_random_error_grows_as_the_signal_falls() {
         (square - 1.0).abs() < 4.0 * (2.0 / n).sqrt() + 0.01,
         "{square}"
     );
-    // Addressed: the same again for other threads, another frame differs.
+    // Addressed: other threads give the same image, another frame differs.
     let one = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -169,7 +169,7 @@ fn the_systematic_error_stays_with_the_device() {
     );
 }
 
-/// The offset of a pixel is the same in every frame, and another for every pixel and device.
+/// The offset of a pixel is the same in every frame, and different for every pixel and device.
 #[test]
 fn the_fixed_pattern_stays_with_the_pixel() {
     let camera = Camera::try_from(pinhole(100, 2000.0)).unwrap();

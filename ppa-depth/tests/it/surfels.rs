@@ -52,7 +52,7 @@ fn a_recorded_plane_is_covered_and_flat() {
 
 #[test]
 fn a_disc_covers_exactly_the_pixels_within_its_radius() {
-    // Oblique in its own frame, turned to face the camera.
+    // Oblique in its own frame, rotated to face the camera.
     let normal = Vector3::new(1.0, -2.0, 3.0);
     let body = Body::from(SurfelBody::new(&[Point3::origin()], &[normal], 31.7).unwrap());
     let facing = UnitQuaternion::rotation_between(&normal.cast(), &Vector3::z()).unwrap();

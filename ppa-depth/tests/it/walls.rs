@@ -1,4 +1,4 @@
-//! A tube whose end was cut off: what cameras see of the wall that closes it.
+//! A tube whose end was cut off: views of the wall that closes it.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_depth::{
@@ -100,7 +100,7 @@ fn a_cut_end_is_flat_or_invalid_but_never_a_hole() {
         on_wall > 5000 && deep > 5000,
         "without walls a camera sees {deep} pixels of the inside"
     );
-    // As one of several surfaces, a wall is one as any.
+    // A wall is a surface like any other.
     let image = render(&camera, &placed(&closed, ahead(end_mm)));
     assert!((image.z_mm[100 * 201 + 100] - end_mm as f32).abs() < 1e-2);
 }
@@ -155,7 +155,7 @@ fn what_stands_before_a_wall_is_seen() {
     assert_eq!(seen.image.z_mm[50 * 101 + 40], 500.0);
 }
 
-/// Light of a wall nobody knows anything about may not mix with that of the table behind its edge, nor reach it by a bounce.
+/// Light of an invalid wall may not mix with that of the table behind its edge, nor reach it by a bounce.
 #[test]
 fn an_invalid_wall_gives_no_light_to_a_sensor() {
     let camera = pinhole(201, 201, 800.0);
@@ -197,7 +197,7 @@ fn an_invalid_wall_gives_no_light_to_a_sensor() {
     let at_rim = |image: &DepthImage| image.z_mm.iter().filter(|z| between(**z)).count();
     assert!(at_rim(&mixed) > 100, "{}", at_rim(&mixed));
     assert_eq!(at_rim(&clean), 0);
-    // Half a pixel beside the rim no sample can see the wall.
+    // Half a pixel outside the rim, no sample can see the wall.
     let half_px_mm = 0.5 * 2.0_f64.sqrt() * end_mm / 800.0;
     for (pixel, z_mm) in clean.z_mm.iter().enumerate() {
         let off_mm = off_axis(&camera, pixel, end_mm);
@@ -207,7 +207,7 @@ fn an_invalid_wall_gives_no_light_to_a_sensor() {
             assert!((z_mm - table_mm).abs() < 1e-2, "{z_mm} at {off_mm} mm");
         }
     }
-    // All that is left is the table: a plane sends itself no light.
+    // Only the table is left: a plane sends itself no light.
     let bounced = observe(&bouncing, WallDepth::Invalid);
     let moved = |image: &DepthImage| {
         let depths = image.z_mm.iter().filter(|z| **z > 0.0);

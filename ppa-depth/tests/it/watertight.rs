@@ -11,7 +11,7 @@ use crate::shapes::bumpy;
 fn no_ray_leaks_through_edges_or_corners() {
     let (vertices, triangles) = bumpy(4);
     let body = Body::from(MeshBody::new(&vertices, &triangles).unwrap());
-    // One pixel, whose ray the pose turns onto each target.
+    // One pixel, whose ray the pose rotates onto each target.
     let camera = pinhole(1, 1, 1.0);
     let eye = Point3::new(1.7, -2.3, 0.9);
     for (index, corners) in triangles.iter().enumerate() {

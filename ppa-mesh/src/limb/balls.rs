@@ -1,4 +1,4 @@
-//! Balls of a scan in which nothing counts as limb, by which a person cuts something off.
+//! Balls in a scan in which nothing counts as limb, for cutting parts off by hand.
 
 use nalgebra::Point3;
 use ppa_ct::{Grid, Values, Volume, VolumeError};
@@ -7,13 +7,13 @@ use super::lattice::Lattice;
 use super::settings::Ball;
 use super::{Hu, LimbError};
 
-/// HU of what a ball removes.
+/// HU of removed voxels.
 const AIR_HU: f32 = -1000.0;
 
 /// HU between the iso value and soft tissue, over a voxel: the surface of a ball is as steep as that of skin.
 const FLESH_HU: f64 = 550.0;
 
-/// The balls of the settings make sense.
+/// Checks that the balls have finite centres and positive, finite radii.
 pub fn check(balls: &[Ball]) -> Result<(), LimbError> {
     for ball in balls {
         let centre = ball.centre_mm.into_iter().find(|x| !x.is_finite());
@@ -37,9 +37,9 @@ pub fn check(balls: &[Ball]) -> Result<(), LimbError> {
     Ok(())
 }
 
-/// The volume with air in the balls, and the volume of what was there above `iso`, mm³.
+/// Returns the volume with air in the balls, and the removed volume above `iso`, mm³.
 ///
-/// The values fall from flesh to air across a voxel, so that the iso surface of what stays is that of the ball.
+/// The values fall from flesh to air across a voxel, so that the new iso surface is that of the ball.
 pub fn without(volume: &Volume, balls: &[Ball], iso: f64) -> Result<(Volume, f64), VolumeError> {
     let grid = volume.grid();
     match volume.values() {
@@ -95,7 +95,7 @@ fn around(grid: &Grid, centre: &Point3<f64>, reach_mm: f64) -> [[usize; 3]; 2] {
     let middle = voxel_from_ct * centre;
     let linear = voxel_from_ct.matrix().fixed_view::<3, 3>(0, 0).into_owned();
     let ends = |axis: usize| {
-        // The farthest that a step of `reach_mm` leads along the axis.
+        // Largest extent of a step of `reach_mm` along the axis.
         let reach = reach_mm * linear.row(axis).norm();
         let size = grid.size()[axis] as f64;
         let low = (middle[axis] - reach).ceil().clamp(0.0, size);

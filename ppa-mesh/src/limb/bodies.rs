@@ -10,7 +10,7 @@ use super::tissue::{BONE, CORE, Tissue};
 /// Depths that differ by less than this are treated alike, mm.
 const DEPTH_STEP_MM: f64 = 0.1;
 
-/// One body: what the watershed gathered around a depth maximum.
+/// One body: the voxels that the watershed gathered around a depth maximum.
 #[derive(Debug, Clone, Default)]
 pub struct Basin {
     /// Largest depth below the body's surface, mm.
@@ -23,7 +23,7 @@ pub struct Basin {
     pub index_sum: [f64; 3],
 }
 
-/// Not deep enough to be of a body.
+/// Label of voxels not deep enough to belong to a body.
 pub const NO_BODY: u32 = u32::MAX;
 
 /// Bodies and the body of each voxel of the box ([`NO_BODY`] for none).
@@ -36,8 +36,8 @@ pub struct Bodies {
 ///
 /// Two basins that meet become one body unless the place where they meet is a neck: less than
 /// `neck_ratio` as deep as the shallower of both. A calf and its foot become one, two
-/// calves that touch stay two. A voxel of a neck belongs to the body of its deepest neighbour: were it
-/// always given to the deeper body, that one would creep around the other, layer by layer.
+/// calves that touch stay two. A voxel of a neck belongs to the body of its deepest neighbour: if it
+/// always went to the deeper body, that body would grow around the other, layer by layer.
 pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
     let lattice = &tissue.lattice;
     let hollow = |at: usize| !tissue.is(at, CORE);
@@ -104,8 +104,8 @@ pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
 }
 
 impl Bodies {
-    /// A point of each body in the `ct` frame, mm: the middle of its core where a voxel of the core is there, else the centre of
-    /// the core's voxel nearest to it, the first of those equally near. A hollow body has its middle outside.
+    /// A point of each body in the `ct` frame, mm: the middle of its core if a core voxel is there, otherwise the centre of the nearest
+    /// core voxel (the first of those equally near). The middle of a hollow body is outside it.
     pub fn points_inside(&self, lattice: &Lattice, grid: &Grid) -> Vec<Point3<f64>> {
         let low = lattice.low.map(|low| low as f64);
         let strides = lattice.strides();
@@ -171,7 +171,7 @@ fn merge(parent: &mut [u32], basins: &mut [Basin], one: u32, other: u32) -> u32 
     keep
 }
 
-/// Voxels at least that deep, deepest first, equal ones in memory order (counting sort).
+/// Voxels at least `least_depth_mm` deep, deepest first, equal ones in memory order (counting sort).
 fn deepest_first(depth_sq: &[f32], least_depth_mm: f64) -> Vec<u32> {
     let step = |squared: f32| (f64::from(squared).sqrt() / DEPTH_STEP_MM).min(1e5) as usize;
     let least_sq = (least_depth_mm * least_depth_mm) as f32;

@@ -10,15 +10,15 @@ use super::{LimbError, LimbSettings};
 
 /// A body weighs half as much when the side faces cut it through about half its size.
 const SIDE_CUT_WEIGHT: f64 = 2.0;
-/// Bodies that weigh at least this much of the heaviest are limbs like it: a foot weighs as much as the
-/// other one, a few toes in the corner of the image do not.
+/// Bodies with at least this fraction of the largest weight also count as limbs: a foot weighs as much as
+/// the other one, a few toes in the corner of the image do not.
 const ALIKE: f64 = 0.4;
 
 /// Two limbs lie side by side along a direction when it points from one to the other within 60 degrees; parts
 /// of one limb do not.
 const SIDE_BY_SIDE: f64 = 0.5;
 
-/// The body around the given point; else the heaviest or, of similarly heavy bodies that lie next to it in the given direction, the farthest.
+/// The body around the given point; without one, the heaviest or, of similarly heavy bodies next to it in that direction, the farthest.
 pub fn body(
     grid: &Grid,
     tissue: &Tissue,
@@ -52,11 +52,11 @@ pub fn body(
 /// A further body that is kept as a part of the limb.
 pub struct Kept {
     pub body: u32,
-    /// The points that were given in it.
+    /// The given points in it.
     pub points: Vec<[f64; 3]>,
 }
 
-/// The bodies around the further points that were given; points of the limb itself change nothing.
+/// The bodies around the further given points; points in the limb itself have no effect.
 pub fn kept(
     grid: &Grid,
     tissue: &Tissue,
@@ -79,8 +79,7 @@ pub fn kept(
     Ok(kept)
 }
 
-/// Keeps the body around a point, or removes it if it is kept; `is_near` says whether a voxel is so near to its body that it may be a part
-/// of it.
+/// Keeps the body around a point, or removes it if it is kept; `is_near` tells whether a voxel is near enough to its body to be part of it.
 pub fn toggle(
     grid: &Grid,
     tissue: &Tissue,
@@ -110,7 +109,7 @@ pub fn toggle(
     Ok(())
 }
 
-/// Whether each body weighs enough to be a limb like the heaviest.
+/// Whether each body is heavy enough to be a limb, compared with the heaviest.
 pub fn alike(lattice: &Lattice, found: &Bodies) -> Vec<bool> {
     let weights = weights(lattice, found);
     let heaviest = weights.iter().copied().fold(0.0, f64::max);
@@ -120,7 +119,7 @@ pub fn alike(lattice: &Lattice, found: &Bodies) -> Vec<bool> {
         .collect()
 }
 
-/// Voxels of bone, those of bodies cut by side faces counting less; without any bone all voxels.
+/// Voxels of bone (all voxels if there is no bone), with less weight for bodies cut by side faces.
 fn weights(lattice: &Lattice, found: &Bodies) -> Vec<f64> {
     let any_bone = found.basins.iter().any(|b| b.bone_voxels > 0);
     let weight = found.basins.iter().map(|basin| {

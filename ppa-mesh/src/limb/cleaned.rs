@@ -1,13 +1,13 @@
-//! The volume with everything but the limb removed.
+//! Removal of everything but the limb from the volume.
 
 use rayon::prelude::*;
 
 use super::Hu;
 use super::lattice::Lattice;
 
-/// HU put where something was removed, away from the limb.
+/// HU of removed voxels away from the limb.
 const AIR_HU: f32 = -1000.0;
-/// HU put into air enclosed by the limb.
+/// HU that replaces air enclosed by the limb.
 const FILL_HU: f32 = 0.0;
 /// Soft tissue above the usual iso value, HU.
 const FLESH_HU: f32 = 550.0;
@@ -15,14 +15,14 @@ const FLESH_HU: f32 = 550.0;
 const FLAT_SHARE: f32 = 0.25;
 const SHARE_RANGE: f32 = 0.2;
 
-/// Everything but the limb removed and the limb filled.
+/// Values with everything but the limb removed and the limb filled.
 ///
-/// Where the limb touched what was removed there is no edge in HU to interpolate, only the mask, and a
+/// Where the limb touched something removed, there is no edge in HU to interpolate, only the mask, and a
 /// surface half-way between voxels would have steps. A removed voxel gets a value that puts the
 /// surface half-way on a flat contact, nearer to it where limb surrounds it (the foot of a step) and
 /// farther where it does not (the top of a step).
 ///
-/// `hu` and `mask` are of the whole volume, what is returned of the box.
+/// `hu` and `mask` cover the whole volume, the returned values the box.
 pub fn cleaned<T: Hu>(part: &Lattice, hu: &[T], mask: &[bool], iso: f32) -> Vec<f32> {
     let mut values = vec![0.0; part.len()];
     let rows = values.par_chunks_mut(part.size[0]).enumerate();
@@ -44,7 +44,7 @@ pub fn cleaned<T: Hu>(part: &Lattice, hu: &[T], mask: &[bool], iso: f32) -> Vec<
     values
 }
 
-/// HU of a removed voxel with that share of limb around it.
+/// HU of a removed voxel with the given share of limb around it.
 fn removed(share: f32, iso: f32) -> f32 {
     if share == 0.0 {
         return AIR_HU.min(iso - 1.0);
@@ -54,7 +54,7 @@ fn removed(share: f32, iso: f32) -> f32 {
     iso - FLESH_HU * (1.0 - along) / along
 }
 
-/// Share of limb around a voxel, weights 1-2-1 along each axis; the border repeats.
+/// Share of limb around a voxel, weights 1-2-1 along each axis; border voxels are repeated.
 fn share_around(size: [usize; 3], mask: &[bool], voxel: [usize; 3]) -> f32 {
     let nearby = |axis: usize| {
         let place = voxel[axis];

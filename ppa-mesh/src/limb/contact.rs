@@ -2,7 +2,7 @@
 
 use super::lattice::Lattice;
 
-/// Rounds of voting; a ripple of the border as long as this many voxels is gone afterwards.
+/// Rounds of voting; they remove ripples of the border up to this many voxels long.
 const ROUNDS: usize = 4;
 
 /// The border between a limb and the bodies that touch it.
@@ -10,12 +10,12 @@ const ROUNDS: usize = 4;
 pub struct Touching {
     /// Area of the faces of voxels between both, mm².
     pub area_mm2: f64,
-    /// Mean of the limb's voxels at it, voxel indices within the box.
+    /// Mean position of the limb's voxels at the border, voxel indices within the box.
     pub voxel: [f64; 3],
 }
 
 impl Touching {
-    /// `None` where nothing touches the limb; `flesh` is the limb and what may touch it.
+    /// Returns `None` if nothing touches the limb; `flesh` is the limb and everything that may touch it.
     pub fn of(lattice: &Lattice, flesh: &[bool], inside: &[bool]) -> Option<Self> {
         let strides = lattice.strides();
         let (mut area_mm2, mut faces, mut sum) = (0.0, 0_usize, [0.0; 3]);
@@ -38,10 +38,10 @@ impl Touching {
     }
 }
 
-/// Smooths the border between `inside` and the rest of `flesh`; that towards air stays.
+/// Smooths the border between `inside` and the rest of `flesh`; the border towards air stays.
 ///
-/// In a contact HU say nothing about where one body ends, and the watershed's border follows the lattice
-/// in steps and single rows of voxels. Each voxel of the border goes to whichever body has more of the
+/// In a contact, HU do not show where one body ends, and the watershed's border follows the lattice
+/// in steps and single rows of voxels. Each voxel of the border goes to the body that has more of the
 /// flesh around it (weights 1-2-1 along each axis).
 pub fn smooth_contacts(lattice: &Lattice, flesh: &[bool], inside: &mut [bool]) {
     for _ in 0..ROUNDS {

@@ -1,4 +1,4 @@
-//! The couch: thin, and the same in every slice.
+//! Detection of the couch, which is thin and the same in every slice.
 
 use rayon::prelude::*;
 
@@ -31,9 +31,9 @@ impl Columns {
 
 /// Finds the couch in a volume.
 ///
-/// A couch is solid in nearly all slices at the same place, whatever lies on it. So is the middle
-/// of a limb, but that is thick: what is left when the persistent columns are opened with a disk is
-/// thin and, if long enough, couch.
+/// A couch is solid at the same place in nearly all slices, whatever lies on it. So is the middle
+/// of a limb, but that is thick. Persistent columns that an opening with a disk removes are thin and,
+/// if they form long pieces, couch.
 pub fn couch_columns<T: Hu>(
     lattice: &Lattice,
     hu: &[T],

@@ -24,7 +24,7 @@ pub fn squared_distances(
 
 /// From voxels with 0 in `squared` ([`FAR_MM2`] elsewhere), carries the squared distance in mm² and
 /// the nearest such voxel's value to all others; beyond `limit_sq` the distance stays far and the
-/// value means nothing.
+/// value has no meaning.
 ///
 /// Exact on a lattice of orthogonal axes: lower envelopes of parabolas, one axis after the other
 /// (Felzenszwalb and Huttenlocher 2012, doi:10.4086/toc.2012.v008a019).
@@ -131,7 +131,7 @@ impl<T: Copy + Default> Columns<T> {
     }
 }
 
-/// What is done to every line along one axis.
+/// Parameters of the pass along one axis.
 struct Sweep {
     /// Squared spacing, mm².
     weight: f64,
@@ -147,7 +147,7 @@ struct Envelope<T> {
 }
 
 impl Sweep {
-    /// Nothing is seen through a target, so each stretch between targets is swept by itself.
+    /// Targets separate a line: each stretch between two of them is processed by itself.
     fn line<T: Copy>(&self, envelope: &mut Envelope<T>, squared: &mut [f32], value: &mut [T]) {
         let mut at = 0;
         while at < self.count {

@@ -1,11 +1,11 @@
-//! From the core of a body back to its skin.
+//! Growth of the core of a body back to its skin.
 
 use super::lattice::Lattice;
 use super::pieces::Pieces;
 use super::tissue::{TISSUE, Tissue};
 
-/// Tissue beyond the grown-back core is skin relief up to this far, and something that touches the
-/// limb where it continues, mm.
+/// Largest height of skin relief above the grown-back core, mm; tissue that continues beyond it only
+/// touches the limb.
 const RELIEF_MM: f64 = 4.0;
 
 /// Squared distance from the core beyond which nothing belongs to a body, mm².
@@ -15,8 +15,8 @@ pub fn farthest_sq(radius_mm: f64) -> f32 {
 
 /// Tissue within the erosion radius of the core, and the skin relief on top of it.
 ///
-/// What lies farther out hangs together in pieces; a piece that stays near is relief that the
-/// erosion wore off, one that reaches far (a sheet, an electrode) only touches the limb.
+/// Tissue farther out forms connected pieces: a piece that stays near is relief removed by the
+/// erosion, one that reaches far (a sheet, an electrode) only touches the limb.
 pub fn grown_back(tissue: &Tissue, reach_sq: &[f32], radius_mm: f64) -> Vec<bool> {
     let lattice = &tissue.lattice;
     // The core is counted from voxel centre to voxel centre; its border lies half a voxel out.
@@ -42,7 +42,7 @@ pub fn grown_back(tissue: &Tissue, reach_sq: &[f32], radius_mm: f64) -> Vec<bool
     mask
 }
 
-/// Removes all but the largest piece and returns how many voxels that were.
+/// Removes all but the largest piece and returns the number of removed voxels.
 pub fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
     let pieces = Pieces::of(lattice, |at| mask[at]);
     let sizes = pieces.sizes();
@@ -57,8 +57,8 @@ pub fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
     removed
 }
 
-/// As [`keep_largest`] for a limb that consists of several bodies: the piece with the most voxels of each body stays.
-/// `labels` say to which body a voxel belongs. Returns how many voxels were removed, and how many pieces stay.
+/// The same as [`keep_largest`] for a limb of several bodies: keeps the piece with the most voxels of each body.
+/// `labels` gives the body of each voxel. Returns the numbers of removed voxels and of remaining pieces.
 pub fn keep_largest_of(
     lattice: &Lattice,
     mask: &mut [bool],
@@ -91,8 +91,8 @@ pub fn keep_largest_of(
     (removed, stays.into_iter().filter(|stays| *stays).count())
 }
 
-/// Adds the voxels that no path outside the mask joins with the border of the box, and returns how
-/// many those were.
+/// Adds the voxels that no path outside the mask connects with the border of the box, and returns
+/// their number.
 pub fn fill_enclosed(lattice: &Lattice, mask: &mut [bool]) -> usize {
     let pieces = Pieces::of(lattice, |at| !mask[at]);
     let mut added = 0;

@@ -37,8 +37,8 @@ impl Lattice {
         }
     }
 
-    /// The box of the same volume that reaches `margin` voxels beyond `low..high`, as far as the
-    /// volume has them.
+    /// The box of the same volume that reaches `margin` voxels beyond `low..high`, clipped to the
+    /// volume.
     pub fn window_around(&self, low: [usize; 3], high: [usize; 3], margin: usize) -> Self {
         let low = low.map(|first| first.saturating_sub(margin));
         Self {
@@ -62,7 +62,7 @@ impl Lattice {
         [at - row * nx, row % ny, row / ny]
     }
 
-    /// The row along x of that number, of values of the whole volume.
+    /// Row number `row` of the box along x, from values of the whole volume.
     pub fn row_of<'a, T>(&self, row: usize, values: &'a [T]) -> &'a [T] {
         let (j, k) = (row % self.size[1], row / self.size[1]);
         let [nx, ny, _] = self.whole;
@@ -79,7 +79,7 @@ impl Lattice {
         }
     }
 
-    /// Whether a voxel lies in the first and in the last layer of the volume across an axis.
+    /// Whether a voxel is in the first and in the last layer of the volume across an axis.
     pub fn at_walls(&self, voxel: [usize; 3], axis: usize) -> [bool; 2] {
         let place = voxel[axis] + self.low[axis];
         [place == 0, place + 1 == self.whole[axis]]

@@ -1,10 +1,10 @@
 //! The limb in a scan: its skin surface and the voxels inside, without couch, sheets and neighbours.
 //!
-//! In order: balls that a person removes become air; tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
-//! change along the scan axis; what solid flesh encloses (air, marrow) counts as flesh; solid bodies
-//! are what remains of denser tissue after an erosion that sheets do not survive, separated where they
-//! only touch; the limb is the body that holds most bone; its skin is grown back to the tissue border,
-//! but not along what merely touches it; air enclosed by that belongs to it; and of the resulting surface, connectivity and DBSCAN keep one piece.
+//! In order: balls set by the user become air; tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
+//! change along the scan axis; cavities enclosed by solid flesh (air, marrow) count as flesh; an erosion that
+//! sheets do not survive leaves solid bodies of denser tissue, which are separated where they
+//! only touch; the limb is the body with the most bone; its skin is grown back to the tissue border,
+//! but not along anything that merely touches it; air enclosed by it belongs to it; connectivity and DBSCAN keep one piece of the surface.
 
 mod balls;
 mod bodies;
@@ -39,7 +39,7 @@ pub use settings::{Ball, LimbSettings, VoxelBox};
 use tissue::{ENCLOSED, Tissue};
 pub use walls::{CutWalls, WallMeasure};
 
-/// Hounsfield units in a type that a volume keeps them in.
+/// Sample type in which a volume stores Hounsfield units.
 trait Hu: Copy + Into<f32> + Send + Sync {}
 impl Hu for i16 {}
 impl Hu for f32 {}
@@ -49,11 +49,11 @@ impl Hu for f32 {}
 pub struct Limb {
     /// Skin in the `ct` frame with outward normals; open where a face of the volume cuts the limb.
     pub mesh: Mesh,
-    /// Walls that close the skin there, apart from it: they are no skin, and a limb does not rest on them.
+    /// Walls that close these openings, stored separately: they are not skin, and a limb does not rest on them.
     pub walls: CutWalls,
     /// Whether each voxel of the volume belongs to the limb, interior included; grid order.
     pub mask: Vec<bool>,
-    /// What was found and cut.
+    /// Report of what was found and cut.
     pub report: LimbReport,
 }
 
@@ -67,11 +67,11 @@ pub enum LimbError {
         crop.low[0], crop.low[1], crop.low[2], crop.high[0], crop.high[1], crop.high[2], size[0], size[1], size[2]
     )]
     Crop {
-        /// Box asked for.
+        /// Requested box.
         crop: VoxelBox,
-        /// Voxels there are.
+        /// Size of the volume, voxels.
         size: [usize; 3],
-        /// What the volume said.
+        /// Error of the volume.
         source: VolumeError,
     },
     /// A setting is out of range.
@@ -81,13 +81,13 @@ pub enum LimbError {
         name: &'static str,
         /// Value found.
         value: f64,
-        /// What would do.
+        /// Allowed values.
         expected: &'static str,
     },
-    /// More voxels than there is memory to work on.
+    /// There is not enough memory for the volume.
     #[error("cannot search for the limb")]
     Memory(#[source] VolumeError),
-    /// Nothing solid is in the volume.
+    /// The volume contains nothing solid.
     #[error(
         "no limb: nothing above {core_hu} HU is thicker than {thickness_mm} mm (values reach {max_hu} HU)"
     )]
@@ -105,7 +105,7 @@ pub enum LimbError {
     /// A point of a body that is to be kept lies outside the volume or in air.
     #[error("the point ({}, {}, {}) mm of a body to keep is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
     Kept([f64; 3]),
-    /// A point of something that is no body, as it is thinner than twice [`LimbSettings::core_radius_mm`].
+    /// A point of a structure that is not a body because it is thinner than twice [`LimbSettings::core_radius_mm`].
     #[error("the point ({}, {}, {}) mm is not inside a body: sheets and other thin structures cannot be kept", .0[0], .0[1], .0[2])]
     Thin([f64; 3]),
     /// The body to keep or to remove is the limb.
@@ -116,32 +116,32 @@ pub enum LimbError {
     Surface(#[from] SurfaceError),
 }
 
-/// Working memory for each voxel: 5.4 times those of 16 bits where a limb fills the scan, and the mask.
+/// Working memory per voxel, bytes: 5.4 times a 16-bit voxel if a limb fills the scan, plus the mask.
 const WORKING_BYTES: usize = 12;
-/// At most, for each voxel of a volume of which something is cut off.
+/// Largest additional memory per voxel if something is cut off, bytes.
 const BYTES_OF_COPY: usize = 4;
 
 /// Finds the limb of a scan.
 ///
-/// The mesh is open where the volume (or the crop) cuts the limb, since a wall there is no skin; the walls
-/// are given beside it. The mask says what to keep when everything else is to be blanked to air.
+/// The mesh is open where the volume (or the crop) cuts the limb, since a wall there is not skin; the walls
+/// are returned separately. The mask shows what to keep when everything else is to be blanked to air.
 ///
-/// Where two limbs are pressed together HU do not show whose skin is whose: there the border is found by
+/// Where two limbs are pressed together, HU do not show whose skin is whose: there the border is found by
 /// depth, in a scan of two hands up to 4 voxels from where an eye puts it. A hollow that the end of the
-/// scan cuts open is not filled. Working memory depends on the box around all tissue: as much as the scan's 16-bit voxels take where a limb lies in
-/// the middle of it, over four times as much where limbs fill it.
+/// scan cuts open is not filled. Working memory depends on the box around all tissue: as much as the scan's 16-bit voxels if a limb is in
+/// the middle of it, over four times as much if limbs fill it.
 ///
 /// # Errors
-/// [`LimbError`] when the settings do not fit, memory does not suffice or nothing solid is there.
+/// [`LimbError`] if the settings do not fit, memory does not suffice or nothing solid is found.
 pub fn extract_limb(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
     extract(volume, settings, None)
 }
 
-/// As [`extract_limb`], with the body around `point` (`ct` frame, mm) kept as a part of the limb, or removed if it is kept; and the points
-/// of [`LimbSettings::kept`] that say so.
+/// The same as [`extract_limb`], with the body around `point` (`ct` frame, mm) kept as a part of the limb, or removed if it is kept. Also
+/// returns the resulting points of [`LimbSettings::kept`].
 ///
 /// # Errors
-/// As [`extract_limb`]; [`LimbError::Kept`] for a point in air, [`LimbError::Thin`] for one in a sheet, [`LimbError::InLimb`] for one in the limb itself.
+/// The same as [`extract_limb`]; [`LimbError::Kept`] for a point in air, [`LimbError::Thin`] in a sheet, [`LimbError::InLimb`] in the limb.
 pub fn toggle_body(
     volume: &Volume,
     settings: &LimbSettings,
@@ -365,7 +365,7 @@ fn from_body(label: &u32) -> f32 {
     if *label == NO_BODY { FAR_MM2 } else { 0.0 }
 }
 
-/// The largest connected piece of the main cluster of surface points; of a limb in several `parts` the largest pieces, as many.
+/// The largest connected piece of the main cluster of surface points; for a limb of several `parts`, that number of largest pieces.
 fn largest_pieces(
     surface: &Mesh,
     settings: &LimbSettings,
@@ -388,7 +388,7 @@ fn largest_pieces(
     }
     let mut order: Vec<usize> = (0..in_main.len()).collect();
     if parts > 1 {
-        // Parts that lie apart are clusters of their own.
+        // Separate parts are clusters of their own.
         in_main.fill(0);
         pieces
             .iter()

@@ -68,7 +68,7 @@ impl Pieces {
         labels.zip(self.runs.iter().map(voxels))
     }
 
-    /// The runs of voxels and whether their piece stays off the border of the box.
+    /// The runs of voxels and whether their piece does not touch the border of the box.
     pub fn enclosed(&self, lattice: &Lattice) -> impl Iterator<Item = (bool, Range<usize>)> {
         let mut open = vec![false; self.count];
         for (piece, run) in self.runs() {

@@ -14,7 +14,7 @@ use super::lattice::Lattice;
 pub struct Body {
     /// Whether this is the limb.
     pub chosen: bool,
-    /// Whether it could be the limb: it holds about as much bone as the body with the most.
+    /// Whether it could be the limb: it has about as much bone as the body with the most.
     #[serde(default)]
     pub alike: bool,
     /// The given points that keep it as part of the limb; empty for other bodies.
@@ -28,14 +28,14 @@ pub struct Body {
     pub side_cut_mm2: f64,
     /// Middle of the core in the `ct` frame, mm.
     pub centre_mm: [f64; 3],
-    /// A point in the core, `ct` frame, mm: its middle, or where that lies outside, as in a splint, the centre of the nearest voxel of the
-    /// core. None in cases from earlier versions.
+    /// A point in the core, `ct` frame, mm: its middle or, if that is outside (as in a splint), the centre of the nearest voxel of the
+    /// core. `None` in cases from earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside_mm: Option<[f64; 3]>,
 }
 
 impl Body {
-    /// A point of the body to select it by, `ct` frame, mm.
+    /// A point by which the body can be selected, `ct` frame, mm.
     pub fn point_mm(&self) -> [f64; 3] {
         self.inside_mm.unwrap_or(self.centre_mm)
     }
@@ -59,7 +59,7 @@ pub struct CutFace {
 pub struct LimbReport {
     /// Solid bodies, the one with the most bone first.
     pub bodies: Vec<Body>,
-    /// Area in which other bodies touch the limb, mm²; the skin there is a guess.
+    /// Area in which other bodies touch the limb, mm²; the skin there is estimated.
     #[serde(default)]
     pub contact_mm2: f64,
     /// Middle of that contact in the `ct` frame, mm.
@@ -88,7 +88,7 @@ pub struct LimbReport {
     pub limb_voxels: usize,
     /// Volume of the limb, mm³.
     pub limb_mm3: f64,
-    /// Voxels the limb spans, half-open.
+    /// First voxel of the box around the limb.
     pub low: [usize; 3],
     /// One past the last voxel of the limb.
     pub high: [usize; 3],
@@ -130,7 +130,7 @@ impl LimbReport {
         });
     }
 
-    /// Where other bodies touch the limb.
+    /// Records where other bodies touch the limb.
     pub(super) fn describe_contact(
         &mut self,
         grid: &Grid,
@@ -144,7 +144,7 @@ impl LimbReport {
         });
     }
 
-    /// Size and extent of the limb, and where the volume cuts it.
+    /// Records the size and extent of the limb, and where the volume cuts it.
     pub(super) fn describe_limb(&mut self, lattice: &Lattice, mask: &[bool]) {
         let (mut low, mut high) = (lattice.whole, [0; 3]);
         let mut at_walls = [0_usize; 6];

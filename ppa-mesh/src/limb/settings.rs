@@ -22,13 +22,13 @@ pub struct Ball {
     pub radius_mm: f64,
 }
 
-/// Choices of [`extract_limb`](crate::extract_limb); the default suits limbs in diagnostic CT.
+/// Settings of [`extract_limb`](crate::extract_limb); the default suits limbs in diagnostic CT.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LimbSettings {
     /// HU of the skin surface, half-way between air and soft tissue.
     pub iso_hu: f64,
-    /// Part of the volume to look at; all of it when absent.
+    /// Part of the volume to search; `None` for all of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop: Option<VoxelBox>,
     /// A point in the wanted limb, `ct` frame, mm, to replace the automatic choice.
@@ -46,7 +46,7 @@ pub struct LimbSettings {
     /// one with the most bone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub towards: Option<[f64; 3]>,
-    /// HU that only bone (or metal) exceeds in bulk; the limb is what holds most of it.
+    /// HU that only bone (or metal) exceeds in bulk; the limb is the body with most of it.
     pub bone_hu: f64,
     /// HU that solid flesh exceeds but cloth and foam blurred with air do not.
     pub core_hu: f64,
@@ -54,7 +54,7 @@ pub struct LimbSettings {
     pub core_radius_mm: f64,
     /// Two bodies count as touching, not as one, when the neck between them is thinner than this fraction of the thinner body.
     pub neck_ratio: f64,
-    /// Smallest fraction of slices in which a column along the scan axis must be solid to be considered couch; above 1, none is.
+    /// Smallest fraction of slices in which a column along the scan axis must be solid to be considered couch; above 1, no column is.
     pub couch_persistence: f64,
     /// Couch shells are thinner than this across the scan axis, mm.
     pub couch_thickness_mm: f64,

@@ -23,7 +23,7 @@ pub struct Tissue {
 }
 
 impl Tissue {
-    /// `None` without tissue.
+    /// Finds the tissue; `None` if there is none.
     pub fn find<T: Hu>(
         whole: &Lattice,
         hu: &[T],
@@ -78,8 +78,8 @@ impl Tissue {
         Some(Self { lattice, kinds })
     }
 
-    /// Makes flesh of whatever solid flesh keeps from the border of the box: marrow, air in wounds and
-    /// joints. Else a limb would be shallow around each such place and fall into pieces there.
+    /// Marks cavities that solid flesh separates from the border of the box as flesh: marrow, air in wounds
+    /// and joints. Otherwise a limb would be shallow around each of them and fall into pieces there.
     pub fn fill_enclosed(&mut self) {
         let hollows = Pieces::of(&self.lattice, |at| !self.is(at, CORE));
         for (enclosed, voxels) in hollows.enclosed(&self.lattice) {

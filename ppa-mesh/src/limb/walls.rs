@@ -32,7 +32,7 @@ pub struct CutWalls {
     pub faces: Vec<(&'static str, Range<usize>)>,
 }
 
-/// One wall, measured.
+/// Measures of one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallMeasure {
     /// The face of the volume: `-i`, `+i`, `-j`, `+j`, `-k` or `+k`.
@@ -46,7 +46,7 @@ pub struct WallMeasure {
 }
 
 impl CutWalls {
-    /// The walls of an open skin on that grid, at whose border it ends.
+    /// Walls of an open skin that ends at the border of `grid`.
     pub(super) fn of(grid: &Grid, skin: &Mesh) -> Self {
         let rim = Rim::of(grid, skin);
         let mut walls = Self::default();
@@ -65,7 +65,7 @@ impl CutWalls {
         for &face in &cut {
             add(face, rim.wall(face), &mut closed);
         }
-        // A face that lies in the limb as a whole has no rim, but the walls beside it end at its border.
+        // A face entirely inside the limb has no rim, but the walls next to it end at its border.
         let mut whole: Vec<usize> = (0..6).filter(|face| !cut.contains(face)).collect();
         let ends_at = |face: usize, closed: &HashSet<[u32; 2]>| {
             let in_face = |id: &u32| rim.is_in(*id, face);
@@ -82,7 +82,7 @@ impl CutWalls {
         walls
     }
 
-    /// Keeps the corners that are used.
+    /// Keeps only the corners that are used.
     fn number_corners(&mut self, vertices: u32, rim: &Rim) {
         let mut numbers = [None; 8];
         for id in self.triangles.as_flattened_mut() {
@@ -102,7 +102,7 @@ impl CutWalls {
         self.triangles.is_empty()
     }
 
-    /// Vertices of the skin, or of a body shape of it, and the corners behind them: what [`triangles`](Self::triangles) number.
+    /// Vertices that [`triangles`](Self::triangles) refer to: those of the skin, or of a body shape of it, then the corners.
     pub fn vertices(&self, skin: &Mesh) -> Vec<Point3<f32>> {
         skin.vertices.iter().chain(&self.corners).copied().collect()
     }
@@ -151,7 +151,7 @@ impl CutWalls {
     }
 }
 
-/// Where a skin ends.
+/// Border of a skin in the faces of the volume.
 struct Rim {
     /// Edges of the walls along the skin, by face; the limb is to their left, seen from outside.
     edges: [Vec<[u32; 2]>; 6],
@@ -193,7 +193,7 @@ impl Rim {
                 .fold(0_u8, |bits, face| bits | 1 << face)
         };
         let at_border: Vec<u8> = skin.vertices.iter().map(bits).collect();
-        // Edges of a plane that belong to one triangle; walls go along them the other way.
+        // Edges of a plane that belong to one triangle; walls use them in the opposite direction.
         let mut candidates = Vec::new();
         for [a, b, c] in &skin.triangles {
             for [from, to] in [[a, b], [b, c], [c, a]] {
@@ -251,7 +251,7 @@ impl Rim {
             let at = handles.binary_search_by_key(&id, |(id, _)| *id);
             at.ok().map(|at| handles[at].1)
         };
-        // What lies left of the rim is limb, what lies right of it is not, and so is all that is not parted from them.
+        // Faces to the left of the rim are limb, those to the right are not; faces connected with them follow.
         let (mut inside, mut right) = (Vec::new(), Vec::new());
         for [from, to] in &self.edges[face] {
             let (Some(from), Some(to)) = (handle(*from), handle(*to)) else {
@@ -262,7 +262,7 @@ impl Rim {
                 inside.push(edge);
             }
         }
-        // Adding an edge turns others, so that faces are looked up once all edges are there.
+        // Adding an edge flips others, so faces are looked up after all edges have been added.
         let beside = |edges: Vec<spade::handles::FixedDirectedEdgeHandle>| {
             let faces = edges
                 .into_iter()
@@ -289,7 +289,7 @@ impl Rim {
         corners_of(&triangles, |face| limb[face.index()])
     }
 
-    /// All of the rectangle of a face.
+    /// Triangles of the entire rectangle of a face.
     fn whole_face(&self, face: usize) -> Vec<[u32; 3]> {
         corners_of(&self.delaunay(face).0, |_| true)
     }
@@ -331,14 +331,14 @@ impl Rim {
     }
 }
 
-/// How far a place is from the plane of a face, voxels.
+/// Distance of a place from the plane of a face, voxels.
 fn off(face: usize, place: &[f64; 3], last: &[f64; 3]) -> f64 {
     let axis = face / 2;
     let plane = if face % 2 == 1 { last[axis] } else { 0.0 };
     (place[axis] - plane).abs()
 }
 
-/// Vertices of the triangles that are kept, counter-clockwise.
+/// Vertices of the triangles to keep, counter-clockwise.
 fn corners_of(
     triangles: &FaceTriangles,
     keep: impl Fn(FixedFaceHandle<InnerTag>) -> bool,

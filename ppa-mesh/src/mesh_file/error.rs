@@ -1,4 +1,4 @@
-//! Why a file of a mesh could not be read or written.
+//! Errors of reading and writing mesh files.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,37 +10,37 @@ pub enum MeshFileError {
     /// The name does not give the format.
     #[error("{} does not end in .ply, .obj or .stl", path.display())]
     Extension {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file cannot be opened.
     #[error("cannot open {}", path.display())]
     Open {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Not a file of that format, or cut short.
+    /// The file is not of that format or is truncated.
     #[error("{} is not a readable {format} file: {reason}", path.display())]
     Format {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the format.
         format: &'static str,
-        /// What was found.
+        /// Cause.
         reason: String,
     },
-    /// No points.
+    /// The file has no points.
     #[error("{} has no vertices with x, y and z", path.display())]
     NoVertices {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
     },
     /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} of {} has a coordinate that is not a number", path.display())]
     NotFinite {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
         /// Index of the vertex, from 0.
         vertex: usize,
@@ -48,32 +48,32 @@ pub enum MeshFileError {
     /// A face names a vertex that does not exist.
     #[error("face {face} of {} refers to vertex {found}, but the number of vertices is {vertices}", path.display())]
     Index {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
         /// Index of the face, from 0.
         face: usize,
-        /// What it names, as it stands in the file.
+        /// Vertex index as written in the file.
         found: String,
         /// Number of vertices.
         vertices: usize,
     },
-    /// The format has no room for points without triangles.
+    /// The format cannot hold points without triangles.
     #[error("{} cannot hold a cloud: STL files hold triangles only", path.display())]
     NoCloud {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file cannot be written.
     #[error("cannot write {}", path.display())]
     Write {
-        /// File asked for.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// What is wrong with the contents of a file, wherever it lies.
+/// Fault in the contents of a file, without its path.
 #[derive(Debug)]
 pub enum Fault {
     Format {

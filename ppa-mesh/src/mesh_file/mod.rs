@@ -16,17 +16,17 @@ use crate::mesh::{Mesh, PointCloud};
 use error::Fault;
 pub use error::MeshFileError;
 
-/// What a file holds.
+/// Contents of a mesh file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MeshContents {
-    /// All vertices; normals are empty when the file has none of use.
+    /// All vertices; normals are empty if the file has no usable ones.
     pub cloud: PointCloud,
-    /// Faces, polygons cut into fans; empty for a cloud.
+    /// Triangles of the faces, with polygons cut into fans; empty for a cloud.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl MeshContents {
-    /// The contents as a mesh; missing normals are made from the triangles.
+    /// The contents as a mesh; missing normals are computed from the triangles.
     pub fn into_mesh(self) -> Mesh {
         let mut mesh = Mesh {
             vertices: self.cloud.points,
@@ -63,8 +63,8 @@ impl Format {
 
 /// Reads a mesh or a cloud in mm: PLY or STL, text or binary, or OBJ.
 ///
-/// Colours, textures and groups are skipped. Normals are kept where the file has one per vertex, each
-/// of them a direction; vertices of an STL file that lie in one place become one.
+/// Colours, textures and groups are skipped. Normals are kept if the file has one per vertex and all of
+/// them have a direction; vertices of an STL file at the same position are merged.
 ///
 /// # Errors
 /// [`MeshFileError`] when the file is missing, broken, or has no points.
@@ -94,14 +94,14 @@ pub fn read_mesh_file(path: &Path) -> Result<MeshContents, MeshFileError> {
     checked.map_err(|fault| MeshFileError::in_file(path, fault))
 }
 
-/// Unit vectors, or none at all if one of them points nowhere.
+/// Unit vectors, or an empty list if one of them has no direction.
 fn directions(mut normals: Vec<Vector3<f32>>) -> Vec<Vector3<f32>> {
     for normal in &mut normals {
         let length = normal.norm();
         if !(length.is_finite() && length > 0.0) {
             return Vec::new();
         }
-        // What rounding left stays, so that writing and reading change nothing.
+        // Rounding errors are kept, so that writing and reading changes nothing.
         if (length - 1.0).abs() > 1e-4 {
             *normal /= length;
         }
@@ -109,7 +109,7 @@ fn directions(mut normals: Vec<Vector3<f32>>) -> Vec<Vector3<f32>> {
     normals
 }
 
-/// Writes a mesh, whole or not at all: binary little-endian PLY or OBJ with normals, or binary STL.
+/// Writes a mesh atomically: binary little-endian PLY or OBJ with normals, or binary STL.
 ///
 /// # Errors
 /// [`MeshFileError::Extension`] and [`MeshFileError::Write`].
@@ -126,7 +126,7 @@ pub fn write_mesh_file(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
     }
 }
 
-/// Writes a cloud, with normals if it has one per point, whole or not at all: PLY or OBJ.
+/// Writes a cloud atomically, with normals if it has one per point: PLY or OBJ.
 ///
 /// # Errors
 /// [`MeshFileError::Extension`], [`MeshFileError::NoCloud`] and [`MeshFileError::Write`].

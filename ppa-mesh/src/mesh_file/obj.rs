@@ -19,10 +19,10 @@ fn broken(line: usize, reason: &str) -> Fault {
     }
 }
 
-/// Lines that start otherwise than with `v`, `vn` and `f` (groups, materials, textures) say nothing
-/// about the shape.
+/// Reads an OBJ file. Lines other than `v`, `vn` and `f` (groups, materials, textures) do not affect the
+/// shape and are skipped.
 pub fn read(bytes: &[u8]) -> Result<MeshContents, Fault> {
-    // Names in comments may be in any code; what matters here is ASCII.
+    // Comments may be in any encoding; everything that matters here is ASCII.
     let text = String::from_utf8_lossy(bytes);
     let (mut points, mut normals) = (Vec::new(), Vec::new());
     let mut corners: Vec<i64> = Vec::new();
@@ -72,7 +72,7 @@ fn three<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f32; 
     Ok([next()?, next()?, next()?])
 }
 
-/// Vertex and normal, from 0, of `7`, `7/3`, `7//5` or `7/3/5`; below 0 they count from the end.
+/// Vertex and normal, from 0, of `7`, `7/3`, `7//5` or `7/3/5`; negative numbers count from the end.
 fn corner(word: &str, points: usize, normals: usize) -> Option<(i64, Option<i64>)> {
     let from_zero = |number: &str, count: usize| match number.parse::<i64>().ok()? {
         number if number < 0 => number.checked_add(count as i64),
@@ -92,7 +92,7 @@ pub fn write(
     normals: &[Vector3<f32>],
     triangles: &[[u32; 3]],
 ) -> io::Result<()> {
-    // As few digits as give back the same number.
+    // The shortest decimal numbers that read back as the same value.
     for p in points {
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
     }

@@ -53,7 +53,7 @@ impl PropertyAccess for Vertex {
 #[derive(Default)]
 struct Face {
     corners: Vec<i64>,
-    /// Whether its corners are something else than whole numbers.
+    /// Whether its corners are not integers.
     unreadable: bool,
 }
 
@@ -159,9 +159,9 @@ pub fn write(
     Ok(())
 }
 
-/// Further elements and properties (colours, quality) are skipped.
+/// Reads a PLY file. Other elements and properties (colours, quality) are skipped.
 pub fn read(file: impl BufRead) -> Result<MeshContents, Fault> {
-    // The parser reports where it was in the first line and why it stopped in one of the others.
+    // The first line of the parser's error gives the position, one of the others the cause.
     let broken = |error: ParseError| {
         let text = error.to_string();
         let cause = |line: &&str| line.trim_start().starts_with("Error:");

@@ -1,4 +1,4 @@
-//! Faces of any number of corners, as files have them.
+//! Faces with any number of corners.
 
 use super::error::Fault;
 
@@ -10,7 +10,7 @@ pub struct Polygons {
 }
 
 impl Polygons {
-    /// For faces between that many vertices.
+    /// For faces of a mesh with `vertices` vertices.
     pub fn between(vertices: usize) -> Self {
         Self {
             vertices,
@@ -19,7 +19,7 @@ impl Polygons {
         }
     }
 
-    /// Adds a face by its corners, vertices from 0; `report` is how the file names one.
+    /// Adds a face by its vertices, numbered from 0; `report` converts an index to the file's numbering.
     pub fn push(&mut self, corners: &[i64], report: impl Fn(i64) -> i64) -> Result<(), Fault> {
         if self.vertices == 0 {
             return Err(Fault::NoVertices);

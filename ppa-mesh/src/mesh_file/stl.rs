@@ -25,8 +25,8 @@ fn broken(reason: String) -> Fault {
     }
 }
 
-/// A binary file has the length that its number of triangles asks for; its header may begin with
-/// `solid`, as text does.
+/// Reads an STL file. A binary file is recognised by the length that its number of triangles implies,
+/// since its header may begin with `solid` as text does.
 pub fn read(bytes: &[u8]) -> Result<MeshContents, Fault> {
     let count = bytes.get(HEADER..START).map(|count| {
         let count = count.try_into().expect("four bytes");
@@ -94,7 +94,7 @@ fn text(text: &str) -> Result<MeshContents, Fault> {
     Ok(shared.contents)
 }
 
-/// Triangles whose corners in one place become one vertex.
+/// Triangles whose corners at the same position become one vertex.
 #[derive(Default)]
 struct Shared {
     contents: MeshContents,
@@ -105,7 +105,7 @@ impl Shared {
     fn push(&mut self, corners: [[f32; 3]; 3]) {
         let points = &mut self.contents.cloud.points;
         let triangle = corners.map(|corner| {
-            // 0 and −0 are one place.
+            // 0 and −0 are the same position.
             let place = corner.map(|c| (c + 0.0).to_bits());
             *self.numbers.entry(place).or_insert_with(|| {
                 points.push(Point3::from(corner));

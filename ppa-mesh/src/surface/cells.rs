@@ -7,14 +7,14 @@ use super::shortcut::EdgePlace;
 
 /// The cells between rows j and j + 1 of slices k and k + 1.
 ///
-/// Every crossed edge belongs to a cell with crossings, so that the numbers on a row of edges are used up in
-/// their order while those cells are visited in theirs.
+/// Every crossed edge belongs to a cell with crossings, so the numbers on a row of edges are consumed in
+/// order as these cells are visited in order.
 pub struct CellRow<'a> {
-    /// By the corner bits of y and z.
+    /// Inside bits by the corner bits of y and z.
     inside: [&'a [u64]; 4],
     /// Numbers on edges along x by the corner bits of y and z, along y by that of z, along z by that of y.
     numbers: [&'a [u32]; 8],
-    /// How many of them belong to edges left of the cell.
+    /// Number of them that belong to edges left of the cell.
     used: [u32; 8],
 }
 
@@ -63,7 +63,7 @@ impl<'a> CellRow<'a> {
         self.numbers[row][(self.used[row] + edge.further()) as usize]
     }
 
-    /// Leaves the cell, of whose left side and edges along x these are crossed, for the next with crossings.
+    /// Moves on to the next cell with crossings; `crossed` counts crossed edges on this cell's left side and along x.
     #[inline]
     pub fn advance(&mut self, crossed: &[u32; 8]) {
         for (used, crossed) in self.used.iter_mut().zip(crossed) {

@@ -133,7 +133,7 @@ impl<T: Sample> March<'_, T> {
         }
     }
 
-    /// Stores the crossings along an axis that wait.
+    /// Stores the pending crossings along an axis.
     fn store(&mut self, axis: usize) {
         let iso = self.field.iso();
         (self.batch).store(axis, iso, self.world, &mut self.part.crossings);

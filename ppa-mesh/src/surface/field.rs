@@ -1,4 +1,4 @@
-//! HU on the lattice, with a layer of air around it when lids are wanted.
+//! HU on the lattice, with a layer of air around it if the border is closed.
 
 use nalgebra::Vector3;
 use ppa_ct::Volume;
@@ -7,7 +7,7 @@ use ppa_ct::Volume;
 /// close to the iso value still gets a lid of its own.
 const MIN_LID_HU: f32 = 1.0;
 
-/// The types that a volume keeps HU in.
+/// Types in which a volume stores HU.
 pub trait Sample: Copy + PartialOrd + Sync + Into<f32> {
     /// The least sample that is not below `iso`; `None` when all are below.
     fn first_inside(iso: f32) -> Option<Self>;
@@ -92,7 +92,7 @@ impl<'a, T: Sample> Field<'a, T> {
         above
     }
 
-    /// A row with the four beside it.
+    /// A row with its four neighbours.
     pub fn stencil(&self, j: usize, k: usize) -> Stencil<'a, T> {
         let [_, ny, nz] = self.size;
         let (south, north) = (j.saturating_sub(1), (j + 1).min(ny - 1));
@@ -112,7 +112,7 @@ fn rise<T: Sample>(low: T, high: T) -> f32 {
     high.into() - low.into()
 }
 
-/// A row of the lattice with its neighbours in y and z; at the border, itself in place of the missing one.
+/// A row of the lattice with its neighbours in y and z; at the border, the row itself replaces a missing one.
 pub struct Stencil<'a, T> {
     here: &'a [T],
     beside: [[&'a [T]; 2]; 2],

@@ -2,7 +2,7 @@
 
 use super::field::{Field, Sample};
 
-/// Bits of neighbouring slices of a field, 64 voxels of a row to a word; the bits behind the end of a row
+/// Bits of neighbouring slices of a field, 64 voxels of a row to a word; the bits after the end of a row
 /// are 0.
 pub struct InsideBits<T> {
     first_inside: T,
@@ -37,7 +37,7 @@ impl SliceBits {
                     word | u64::from(hu >= first_inside) << bit
                 }));
             }
-            // Without an early end, so that the compiler compares many at once.
+            // Without early exit, so that the compiler compares many at once.
             let equal = |found: bool, &hu: &T| found | (hu == first_inside);
             at_iso.push(iso_occurs && row.iter().fold(false, equal));
         }
@@ -46,7 +46,7 @@ impl SliceBits {
 }
 
 impl<T: Sample> InsideBits<T> {
-    /// For a field whose samples are inside from `first_inside` on; without slices yet.
+    /// For a field whose samples are inside from `first_inside` upwards; without slices yet.
     pub fn new(field: &Field<T>, first_inside: T, first_slice: usize) -> Self {
         let [nx, rows, _] = field.size();
         Self {
@@ -134,7 +134,7 @@ impl<T: Sample> InsideBits<T> {
     }
 }
 
-/// The bits of the right-hand neighbours; 0 behind the end of the row.
+/// The bits of the right-hand neighbours; 0 after the end of the row.
 pub fn right_of(row: &[u64], word: usize) -> u64 {
     row[word] >> 1 | row.get(word + 1).map_or(0, |next| next << 63)
 }
@@ -151,7 +151,7 @@ pub fn ones(mut word: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Compares into bytes, which the compiler does for many samples at once, then gathers the bytes' bits:
+/// Compares samples into bytes, which the compiler vectorises, then gathers the bits of the bytes:
 /// the product moves bit 8 i to 56 + i for i = 0 to 7, and no two of the others meet.
 fn pack<T: Sample>(chunk: &[T; 64], first_inside: T) -> u64 {
     const GATHER: u64 = 0x0102_0408_1020_4080;

@@ -10,10 +10,10 @@ use super::numbers::{AT_VOXEL, KIND_SHIFT};
 use super::points::Points;
 use crate::mesh::Mesh;
 
-/// Numbers from here on would have the bits of another kind.
+/// Vertex numbers from here on would have the bits of another kind.
 const MOST_VERTICES: usize = AT_VOXEL as usize;
 
-/// All crossings, then all voxels that are vertices, then all extra vertices, each part behind the one before.
+/// All crossings, then all voxels that are vertices, then all extra vertices, each part after the previous one.
 pub fn join(mut parts: Vec<Part>, mirrored: bool) -> Result<Mesh, SurfaceError> {
     let kinds: [fn(&Part) -> &Points; 3] = [|p| &p.crossings, |p| &p.at_voxels, |p| &p.extra];
     let mut first = [0; 3];
@@ -77,8 +77,8 @@ pub fn join(mut parts: Vec<Part>, mirrored: bool) -> Result<Mesh, SurfaceError> 
     Ok(mesh)
 }
 
-/// Leaves out the voxels at the iso value whose triangles all shrank to nothing, as that of a single one in air.
-/// `marked` are the triangles with other vertices than crossings.
+/// Drops voxels at the iso value whose triangles all degenerated, such as a single one in air.
+/// `marked` are the triangles with vertices other than crossings.
 fn drop_lone_voxels(mesh: &mut Mesh, marked: &[usize], voxels: Range<usize>) {
     let mut is_used = vec![false; voxels.len()];
     for id in marked.iter().flat_map(|&at| mesh.triangles[at]) {
@@ -111,7 +111,7 @@ fn drop_lone_voxels(mesh: &mut Mesh, marked: &[usize], voxels: Range<usize>) {
     mesh.normals.retain(|_| at.next().is_some_and(stays));
 }
 
-/// Where the gradient vanishes (a plateau at the iso value) the triangles say what is outward.
+/// Where the gradient vanishes (a plateau at the iso value), the triangles determine the normals.
 fn fill_flat_normals(mesh: &mut Mesh) {
     if mesh.normals.iter().all(|n| *n != Vector3::zeros()) {
         return;

@@ -19,13 +19,13 @@ pub struct Part {
     pub crossings: Points,
     pub at_voxels: Points,
     pub extra: Points,
-    /// Vertex numbers; those behind the own ones are the first of the next part.
+    /// Vertex numbers; those after the part's own are the first of the next part.
     pub triangles: Vec<[u32; 3]>,
-    /// The triangles that have other vertices than crossings.
+    /// The triangles that have vertices other than crossings.
     pub marked: Vec<usize>,
 }
 
-/// The march with what it has made so far.
+/// State of the march.
 pub struct March<'a, T> {
     pub field: &'a Field<'a, T>,
     pub world: &'a World,
@@ -70,8 +70,8 @@ impl<'a, T: Sample> March<'a, T> {
         march
     }
 
-    /// Marches through the cells between slices k and k + 1; slice k + 1 belongs to the part if it is `own`, else to
-    /// the next. `inside` has slice k + 2, if there is one.
+    /// Marches through the cells between slices k and k + 1; slice k + 1 belongs to the part if it is `own`,
+    /// otherwise to the next. `inside` has slice k + 2, if there is one.
     pub fn layer(&mut self, inside: &InsideBits<T>, k: usize, own: bool) {
         let [low, mut high] = std::mem::take(&mut self.slices);
         let mut upright = std::mem::take(&mut self.upright);
@@ -152,7 +152,7 @@ impl<T: Sample> March<'_, T> {
         }
     }
 
-    /// A cell with several loops or with faces that the asymptotic decider has to look at. `values` are
+    /// A cell with several loops or with faces that need the asymptotic decider. `values` are
     /// HU above iso; exact for the usual HU, so that both cells at a face decide alike.
     fn several_disks(
         &mut self,

@@ -46,7 +46,7 @@ pub enum SurfaceError {
     /// No crossing of the iso value.
     #[error("no surface at {iso_hu} HU: the volume's values lie between {min_hu} and {max_hu} HU")]
     Empty {
-        /// Iso value asked for.
+        /// Requested iso value.
         iso_hu: f32,
         /// Smallest value of the volume.
         min_hu: f32,
@@ -106,9 +106,9 @@ pub fn iso_surface(volume: &Volume, iso_hu: f32, border: Border) -> Result<Mesh,
 /// [`iso_surface`] for several iso values, in their order, in one pass over the volume.
 ///
 /// # Errors
-/// As [`iso_surface`]. Of several errors the first in this order is returned: an iso value that is no
-/// number, a volume too thin, an iso value above all that its samples can hold, and of the others the first
-/// iso value that has no surface or too large a one.
+/// The same as [`iso_surface`]. Of several errors, the first in this order is returned: an iso value that
+/// is not finite, a volume that is too thin, an iso value above the range of the samples, and the first
+/// iso value whose surface is empty or too large.
 pub fn iso_surfaces(
     volume: &Volume,
     iso_hu: &[f32],
@@ -154,7 +154,7 @@ pub(crate) fn surface_of_part(
     Ok(surfaces.swap_remove(0))
 }
 
-/// The surfaces of fields of one size and origin.
+/// The surfaces of fields with the same size and origin.
 fn surfaces<T: Sample>(fields: &[Field<T>], grid: &Grid) -> Result<Vec<Mesh>, SurfaceError> {
     let Some(field) = fields.first() else {
         return Ok(Vec::new());
@@ -167,8 +167,8 @@ fn surfaces<T: Sample>(fields: &[Field<T>], grid: &Grid) -> Result<Vec<Mesh>, Su
         .map(|field| T::first_inside(field.iso()).ok_or_else(|| empty(field)))
         .collect::<Result<_, _>>()?;
     let world = World::new(grid, field.origin());
-    // One part per thread: the first is made where the whole is to lie, the others are copied behind it. What
-    // comes out is the same for any parts.
+    // One part per thread: the first is extended in place, the others are copied behind it. The result does not
+    // depend on the parts.
     let crossings = estimated_crossings(fields, &first_inside);
     // Comparing a voxel takes about as long as 1/256 of a crossing with its triangles.
     let compared = field.size()[0] * field.size()[1] * fields.len() / 256;
@@ -221,7 +221,7 @@ fn march<T: Sample>(
         // The slice on top belongs to the next part, if there is one.
         let own = k + 1 < layers.end || k + 2 == slices;
         for (inside, march) in &mut marches {
-            // Compared shortly before its samples are asked for again: they are in the cache then.
+            // Compared shortly before its samples are needed again, while they are in the cache.
             inside.extend_to((k + 3).min(slices), march.field);
             march.layer(inside, k, own);
         }
@@ -229,8 +229,8 @@ fn march<T: Sample>(
     marches.into_iter().map(|(_, march)| march.part).collect()
 }
 
-/// About how many edges cross the iso values from each slice on, from every eighth slice; for shares of work
-/// and room, hence a quarter more.
+/// Estimated number of edges that cross the iso values from each slice on, from every eighth slice, plus a
+/// quarter; for sharing work and reserving memory.
 fn estimated_crossings<T: Sample>(fields: &[Field<T>], first_inside: &[T]) -> Vec<usize> {
     const STRIDE: usize = 8;
     let slices = fields[0].size()[2];
@@ -252,8 +252,7 @@ fn estimated_crossings<T: Sample>(fields: &[Field<T>], first_inside: &[T]) -> Ve
     (0..slices).map(|k| sampled[k / STRIDE] * 15 / 8).collect()
 }
 
-/// Divides the layers of cells between slices, so that each part has as much work as the others, as far as
-/// whole layers let it.
+/// Divides the layers of cells between slices into parts with as equal work as whole layers allow.
 fn layers_of_parts(work: &[usize], parts: usize) -> Vec<Range<usize>> {
     let layers = work.len() - 1;
     let all: usize = work[..layers].iter().sum();

@@ -1,8 +1,8 @@
 //! Numbers of the vertices on the edges of the lattice.
 
-/// What a vertex number counts, in its two highest bits: crossings of edges, voxels that equal the iso value
-/// and are vertices themselves, and extra vertices inside cells are numbered apart, so that the numbers of
-/// the crossings of a slice are known before the cells below it are filled.
+/// Kind of a vertex, in the two highest bits of its number: crossings of edges, voxels that equal the iso
+/// value and are vertices themselves, and extra vertices inside cells are numbered separately, so that the
+/// numbers of the crossings of a slice are known before the cells below it are filled.
 pub const AT_VOXEL: u32 = 1 << KIND_SHIFT;
 pub const EXTRA: u32 = 2 << KIND_SHIFT;
 pub const KIND_SHIFT: u32 = 30;
@@ -11,7 +11,7 @@ pub const KIND_SHIFT: u32 = 30;
 #[derive(Default)]
 pub struct Numbers {
     ids: Vec<u32>,
-    /// Where each row begins; one more than there are rows.
+    /// Start of each row; one entry more than there are rows.
     starts: Vec<usize>,
 }
 
@@ -30,7 +30,7 @@ impl Numbers {
         self.starts.push(self.ids.len());
     }
 
-    /// Those of the edges from row j, in the order of x.
+    /// Numbers of the edges from row j, in the order of x.
     pub fn row(&self, j: usize) -> &[u32] {
         &self.ids[self.starts[j]..self.starts[j + 1]]
     }
@@ -41,7 +41,7 @@ impl Numbers {
 pub struct Slice {
     /// Voxels that are vertices because they equal the iso value, ascending, with their numbers.
     pub at_voxel: Vec<(u32, u32)>,
-    /// On edges along x and y.
+    /// Numbers on edges along x and y.
     pub along: [Numbers; 2],
 }
 

@@ -43,8 +43,8 @@ pub struct End {
     pub gradient: [f32; 3],
 }
 
-/// Crossed edges along one axis that wait to become vertices; by component, so that the compiler computes
-/// several at once.
+/// Pending crossed edges along one axis, stored by component so that the compiler computes several at
+/// once.
 pub struct Batch {
     waiting: usize,
     voxel: [[u32; LANES]; 3],

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use super::cell::{CONFIGURATIONS, Configuration, Disk, edge_corners};
 
-/// Where the number on a crossed edge of a cell stands: in which of the eight rows of edges that the cell
+/// Position of the number on a crossed edge of a cell: the row, of the eight rows of edges that the cell
 /// touches, and whether an edge of that row on the cell's left side is crossed as well and comes first.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct EdgePlace(u8);
@@ -51,9 +51,9 @@ pub fn is_crossed(inside: u8, edge: u8) -> bool {
     a != b
 }
 
-/// A sign configuration as the march meets it.
+/// Precomputed data of a sign configuration.
 pub struct Shortcut {
-    /// By row of edges, how many numbers it is ahead in the next cell.
+    /// For each row of edges, how far its numbers advance to the next cell.
     pub crossed: [u32; 8],
     pub filling: Filling,
 }
@@ -96,14 +96,14 @@ fn filling(inside: u8, configuration: &Configuration) -> Filling {
 /// A loop of four crossings: around four parallel edges of the cell, or around one edge of which both ends are
 /// on one side and all other corners on the other.
 pub struct Quad {
-    /// Where its numbers stand.
+    /// Positions of its numbers.
     pub ring: [EdgePlace; 4],
     /// The ends of the edges in the order of the ring.
     near: [u8; 4],
     far: [u8; 4],
     /// The other two corners if the loop is around an edge.
     others: [u8; 2],
-    /// 1 for parallel edges, else 0.
+    /// 1 for parallel edges, otherwise 0.
     parallel: f32,
 }
 

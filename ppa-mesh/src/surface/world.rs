@@ -3,20 +3,20 @@
 use nalgebra::{Affine3, Matrix3, Point3, Vector3};
 use ppa_ct::Grid;
 
-/// Where points and gradients of a lattice lie in the world.
+/// Maps points and gradients of a lattice to the world.
 pub struct World {
     /// mm from voxel indices of the field.
     affine: Affine3<f64>,
     /// Outward covectors from gradients.
     outward: Matrix3<f32>,
-    /// Whether the map turns right hands into left ones.
+    /// Whether the map reverses handedness.
     pub mirrored: bool,
     /// Crossings nearer to a voxel than this fraction of an edge are moved away from it: in f32 they
     /// could coincide with one on another edge of that voxel.
     pub nearest: f64,
 }
 
-/// [`World::nearest`] unless the volume lies so far from the origin that f32 needs more.
+/// [`World::nearest`] unless the volume is so far from the origin that f32 needs more.
 const NEAREST: f64 = 1e-4;
 
 impl World {
@@ -35,7 +35,7 @@ impl World {
         }
     }
 
-    /// mm.
+    /// Position of a voxel index in the world, mm.
     pub fn point(&self, voxel: Vector3<f64>) -> Point3<f32> {
         let m = self.affine.matrix();
         let row =
@@ -82,8 +82,8 @@ impl World {
     }
 }
 
-/// The fraction of the shortest edge that moves a point by two steps of f32 along some axis, wherever in the
-/// volume it lies; at most a quarter.
+/// The fraction of the shortest edge that moves a point by two steps of f32 along some axis, anywhere in the
+/// volume; at most a quarter.
 fn resolved_fraction(grid: &Grid) -> f64 {
     let last = grid.size().map(|n| n as f64);
     let corners = (0..8).map(|corner: usize| {

@@ -100,7 +100,7 @@ fn the_inward_shift_ends_short_of_the_radius_of_curvature() {
     );
     let (most, left_mm3) = largest(&rod(8.0));
     let exact_mm3 = std::f64::consts::PI * (16.0 * 14.9 + 4.0 / 3.0 * 64.0);
-    // Vertices that were put aside a little lie farther from where they came from.
+    // Vertices moved sideways a little are farther from their origin.
     assert!((4.0..4.1).contains(&most), "{most} mm");
     assert!(
         (left_mm3 / exact_mm3 - 1.0).abs() < 0.04,
@@ -123,7 +123,7 @@ fn sites_without_skin_are_passed_over() {
     assert_eq!(bumps(&[]), Err(ShapeError::NoSite { count: 3 }));
 }
 
-/// Two fingers 4 mm apart that grow out of one palm, and the palm's flat far side.
+/// Two fingers 4 mm apart on one palm, and the palm's flat far side.
 fn fingers() -> Mesh {
     let field = volume([64, 40, 50], [0.7, 0.7, 0.7], |p| {
         let finger = |x: f64| {
@@ -166,7 +166,7 @@ fn fingers_that_grow_do_not_pass_through_each_other() {
             shifts.len()
         );
     }
-    // Where nothing limits it the new skin is as far from the old one as was asked.
+    // Where nothing limits it, the new skin is at the requested distance from the old one.
     let moved = offset(&hand, 4.0).unwrap();
     let shifts = Displacement::between(&hand, &moved).shifts_mm;
     let whole = moved.vertices.iter().zip(shifts);
@@ -204,7 +204,7 @@ fn the_volume_of_a_displacement_is_that_of_the_meshes() {
         );
         assert_eq!(change > 0.0, distance > 0.0);
     }
-    // An open skin has a volume of its own only with a lid, its change needs none.
+    // An open skin has a volume only with a lid, but its change needs none.
     let (leg, scan, limb) = &*PHANTOM;
     let change = Displacement::between(&limb.mesh, &offset(&limb.mesh, 3.0).unwrap()).volume_mm3;
     let grid = scan.grid();

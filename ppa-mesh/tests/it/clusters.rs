@@ -7,7 +7,7 @@ use ndarray16::Array2;
 use ppa_mesh::dbscan;
 use proptest::prelude::*;
 
-/// At a distance of exactly the radius, where rounding could put the two a cell too far apart.
+/// Points exactly the radius apart, which rounding could put a cell too far apart.
 #[test]
 fn points_at_the_radius_are_neighbours() {
     let points = [0.5_f32.powi(53), 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0));
@@ -18,7 +18,7 @@ fn points_at_the_radius_are_neighbours() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
-    /// On lattice points (many equal coordinates), from the definition in O(n²).
+    /// On lattice points (many equal coordinates), against the definition in O(n²).
     #[test]
     fn clusters_follow_the_definition(
         places in prop::collection::vec(prop::array::uniform3(0..9_i8), 1..90),
@@ -42,7 +42,7 @@ proptest! {
                 prop_assert_eq!(clusters.labels[a], clusters.labels[b]);
             }
         }
-        // As many clusters as core components: nothing joined that is apart.
+        // As many clusters as core components: separate components are not joined.
         let mut component: Vec<usize> = (0..n).collect();
         for _ in 0..n {
             for (a, b) in (0..n * n).map(|ab| (ab / n, ab % n)) {

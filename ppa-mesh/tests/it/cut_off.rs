@@ -1,4 +1,4 @@
-//! Balls of a scan that are cut off.
+//! Cutting balls off a scan.
 
 use nalgebra::Point3;
 use ppa_mesh::{Ball, LimbError, LimbSettings, extract_limb, toggle_body};
@@ -38,7 +38,7 @@ fn a_ball_takes_its_voxels_and_leaves_its_surface() {
         }
         taken += usize::from(whole.mask[at] && off_mm < 0.0);
     }
-    // Only voxels of the limb lie in the ball, each of 1.5 mm a side.
+    // Only voxels of the limb are in the ball, each 1.5 mm wide.
     let taken_mm3 = taken as f64 * VOXEL_MM.powi(3);
     assert!(taken_mm3 > 3000.0, "{taken_mm3}");
     assert!(
@@ -60,7 +60,7 @@ fn what_a_cut_separates_is_a_body_that_can_be_kept() {
     let (_, scan, whole) = &*PHANTOM;
     let grid = scan.grid();
     let bones = &whole.report.bodies[0];
-    // Through all of the shin.
+    // Through the entire shin.
     let [low, high] = [whole.report.low, whole.report.high];
     let middle = grid.centre([0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]) as f64));
     let shin = whole.mesh.vertices.iter().map(|v| v.cast::<f64>());
@@ -79,7 +79,7 @@ fn what_a_cut_separates_is_a_body_that_can_be_kept() {
     };
     let settings = removing(ball);
     let cut = extract_limb(scan, &settings).expect("limb");
-    // Beside specks that the cut leaves.
+    // Besides specks that the cut leaves.
     let bodies = cut.report.bodies.iter();
     let large = bodies.filter(|body| body.core_mm3 > 0.1 * bones.core_mm3);
     assert_eq!(large.count(), 2, "{:?}", cut.report.bodies);

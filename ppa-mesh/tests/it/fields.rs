@@ -1,4 +1,4 @@
-//! Volumes from formulas, and where the reference numbers are.
+//! Volumes from formulas, and the location of the reference numbers.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 use ppa_ct::{Grid, Volume};
 use serde_json::Value;
 
-/// The folder of reference data beside the repository.
+/// The folder of reference data next to the repository.
 pub fn shared() -> PathBuf {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared");
     std::env::var_os("PPA_SHARED").map_or_else(beside, PathBuf::from)
@@ -22,7 +22,7 @@ pub fn numbers<const N: usize>(value: &Value) -> [f64; N] {
     std::array::from_fn(|at| value[at].as_f64().expect("number"))
 }
 
-/// The first `count` values of that seed.
+/// The first `count` values of a seed.
 pub fn hash_noise(count: usize, seed: u64) -> Vec<f64> {
     (0..count as u64)
         .map(|index| ppa_tests::hash_noise(index, seed))

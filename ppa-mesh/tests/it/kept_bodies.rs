@@ -1,4 +1,4 @@
-//! Bodies beside the limb that are kept as parts of it.
+//! Bodies next to the limb that are kept as parts of it.
 
 use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
@@ -7,7 +7,7 @@ use ppa_phantom::{LowerLeg, TableTop};
 
 use crate::limb::VOXEL_MM;
 
-/// A block of 30 mm beside the shin, 6 mm of air between them, and its centre.
+/// A block of 30 mm next to the shin, 6 mm of air between them, and its centre.
 fn with_block(scan: &Volume, alone: &Limb) -> (Volume, Point3<f64>) {
     let grid = scan.grid();
     let right = alone.mesh.vertices.iter().map(|v| f64::from(v.x));
@@ -82,7 +82,7 @@ fn a_body_is_kept_where_a_person_points_at_it() {
     };
     assert_eq!((points(&removed), points(&kept)), (vec![0, 0], vec![0, 1]));
 
-    // A second point of the block, or one of the leg, changes nothing; one in air is refused.
+    // A second point of the block, or one of the leg, has no effect; one in air is refused.
     let aside = centre + nalgebra::Vector3::new(3.0, 0.0, 0.0);
     assert_eq!(of(&[centre, aside]).expect("limb").mask, kept.mask);
     let in_leg = Point3::from(removed.report.bodies[0].centre_mm);
@@ -137,7 +137,7 @@ fn a_toggled_body_is_kept_and_removed_as_its_points_say() {
     assert_eq!(refused, Err(LimbError::Thin(in_sheet)));
 }
 
-/// A gutter of 12 mm beside the shin, open towards the front: its middle lies in the air within it.
+/// A gutter of 12 mm next to the shin, open towards the front: its middle is in the air within it.
 #[test]
 fn a_hollow_body_is_kept_by_the_point_of_its_report() {
     let leg = LowerLeg::p01();
@@ -145,7 +145,7 @@ fn a_hollow_body_is_kept_by_the_point_of_its_report() {
     let alone = extract_limb(&scan, &LimbSettings::default()).expect("limb");
     let (planted, block) = with_block(&scan, &alone);
     let grid = planted.grid();
-    // In place of the block, which is as far from the shin.
+    // Instead of the block, which is as far from the shin.
     let axis = block + nalgebra::Vector3::new(-20.0, 0.0, 0.0);
     let (inner_mm, outer_mm) = (20.0, 32.0);
     let more = ((outer_mm + 25.0) / VOXEL_MM).ceil() as usize;

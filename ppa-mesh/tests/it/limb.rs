@@ -100,7 +100,7 @@ fn a_neighbour_and_a_sheet_leave_the_skin_where_it_was() {
     let limb = extract_limb(&planted, &LimbSettings::default()).expect("limb");
     assert!(limb.report.other_voxels > 2000, "{:?}", limb.report);
 
-    // Where the two are pressed together nobody knows where the skin was.
+    // Where the two are pressed together, the position of the skin is unknown.
     let free = |v: &Point3<f64>| (v.x - axis.x).hypot(v.y - axis.y) > radius_mm + 2.0 * VOXEL_MM;
     let vertices = limb.mesh.vertices.iter().map(|v| v.cast::<f64>());
     let (away, pressed): (Vec<_>, Vec<_>) = vertices.partition(free);
@@ -119,7 +119,7 @@ fn a_neighbour_and_a_sheet_leave_the_skin_where_it_was() {
     );
 }
 
-/// Two legs alike a hand's breadth apart: the direction chooses, not the few voxels of bone by which one is larger.
+/// Two similar legs a hand's breadth apart: the direction decides, not the few voxels of bone by which one is larger.
 #[test]
 fn of_two_limbs_the_one_in_the_wanted_direction_is_taken() {
     let leg = LowerLeg::p01()
@@ -151,7 +151,7 @@ fn of_two_limbs_the_one_in_the_wanted_direction_is_taken() {
             2
         );
     }
-    // Lengthwise they do not lie side by side: nothing is chosen by that direction.
+    // Lengthwise they are not side by side, so that direction has no effect.
     let lengthwise = LimbSettings {
         towards: Some([0.0, 0.0, 1.0]),
         ..LimbSettings::default()
@@ -163,7 +163,7 @@ fn of_two_limbs_the_one_in_the_wanted_direction_is_taken() {
     );
 }
 
-/// Air in the flesh, marrow as light as lung and bone in all of it leave the cloud as it was.
+/// Air in the flesh, marrow as light as lung and bone throughout do not change the surface.
 #[test]
 fn nothing_inside_reaches_the_surface() {
     let (leg, scan, alone) = &*PHANTOM;
@@ -211,7 +211,7 @@ fn a_crop_finds_the_same_skin() {
     assert_eq!(part.report.low[2], 20);
 }
 
-/// A rod through all of a scan with a tilted gantry.
+/// A rod through an entire scan with a tilted gantry.
 #[test]
 fn a_sheared_scan_has_the_limb_s_own_volume() {
     let tilt = 20_f64.to_radians();

@@ -17,7 +17,7 @@ struct Scan {
     litres: [f64; 2],
     /// Slices in which another limb does not touch it.
     free: Range<usize>,
-    /// Slice, row and, as seen by eye in a picture of the slice, the column where the limb ends at
+    /// Slice, row and, read by eye from a picture of the slice, the column where the limb ends at
     /// the other one.
     ends: &'static [[usize; 3]],
 }
@@ -100,7 +100,7 @@ fn six_limbs_lose_couch_sheet_and_neighbour() {
         check_closed(volume.grid(), &limb, scan.name);
 
         // In one slice at a time, without couch finding, erosion or watershed: the dense tissue that
-        // hangs together is limb, and the limb goes hardly beyond it.
+        // is connected is limb, and the limb hardly extends beyond it.
         let (mut dense, mut lost, mut gained) = (0, 0, 0);
         for k in scan.free.clone() {
             let tissue = dense_tissue(&volume, &limb, k);
@@ -166,7 +166,7 @@ fn dense_tissue(volume: &Volume, limb: &Limb, k: usize) -> Vec<bool> {
     mask
 }
 
-/// Whatever in a slice is not dense and hangs together with the slice's border.
+/// Pixels of a slice that are not dense and are connected with the slice's border.
 fn outside(volume: &Volume, k: usize) -> Vec<bool> {
     let [nx, ny, _] = volume.grid().size();
     let thin: Vec<bool> = is_dense(volume, k).iter().map(|dense| !dense).collect();
@@ -189,7 +189,7 @@ fn is_dense(volume: &Volume, k: usize) -> Vec<bool> {
     voxels.map(|at| volume.values().at(at) >= SKIN_HU).collect()
 }
 
-/// Pieces of a mask of `size` voxels that hang together through sides.
+/// Pieces of a mask of `size` voxels that are connected through sides.
 fn pieces(mask: &[bool], [nx, ny]: [usize; 2]) -> Vec<Vec<usize>> {
     let mut seen = vec![false; mask.len()];
     let mut found = Vec::new();

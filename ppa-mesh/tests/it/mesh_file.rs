@@ -237,7 +237,7 @@ static SEEDS: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// Whatever happens to a file, reading ends with an error or with a mesh that holds together.
+    /// However a file is damaged, reading ends with an error or with a consistent mesh.
     #[test]
     fn damaged_files_do_no_harm(
         seed in any::<prop::sample::Index>(),

@@ -1,4 +1,4 @@
-//! Against other tools' measured errors and exact answers beside the repository.
+//! Against measured errors of other tools and exact answers stored next to the repository.
 
 use std::collections::HashSet;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::fields::{Solid, hash_noise, numbers, reference, volume};
 
-/// Least absolute value of an error among the peers.
+/// Smallest absolute error among the peers.
 fn best(peers: &Value, key: &str) -> f64 {
     let found = peers.as_object().expect("peers").values();
     found

@@ -1,4 +1,4 @@
-//! The iso-surface against answers that can be derived.
+//! The iso-surface against derived answers.
 
 use std::f64::consts::PI;
 
@@ -100,7 +100,7 @@ fn a_voxel_at_the_iso_value_is_one_vertex() {
     );
 }
 
-/// A voxel at the iso value in air has no surface; beside a body it leaves no vertex and no normal behind, wherever parts begin.
+/// A voxel at the iso value in air has no surface; next to a body it leaves no vertex and no normal behind, wherever parts begin.
 #[test]
 fn a_lone_voxel_at_the_iso_value_is_nothing() {
     let body = |lone: &[[f64; 3]]| {
@@ -129,7 +129,7 @@ fn a_lone_voxel_at_the_iso_value_is_nothing() {
     assert!(alone.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-5));
 }
 
-/// A voxel a hair above the iso value 1.5 m from the origin, where f32 has steps of 0.12 µm: its six crossings stay apart.
+/// A voxel slightly above the iso value 1.5 m from the origin, where f32 has steps of 0.12 µm: its six crossings stay apart.
 #[test]
 fn crossings_beside_a_voxel_stay_apart_far_from_the_origin() {
     for (origin_mm, spacing_mm) in [(0.0, 0.5), (1500.0, 0.5), (-20_000.0, 0.3)] {

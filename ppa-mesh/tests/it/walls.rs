@@ -109,7 +109,7 @@ fn a_bar_through_the_volume_ends_in_two_discs() {
     }
 }
 
-/// Faces that lie within the limb as a whole have no rim; corners of the volume are shared by three walls.
+/// Faces entirely inside the limb have no rim; corners of the volume are shared by three walls.
 #[test]
 fn a_block_that_fills_the_volume_below_is_closed() {
     for mirror in [1.0, -1.0] {
@@ -155,7 +155,7 @@ fn body_shapes_stay_closed_by_the_walls_of_the_skin() {
     }
 }
 
-/// Of a hollow that the end of the scan opens the skin knows nothing; the wall covers it.
+/// The skin does not include a hollow that the end of the scan opens; the wall covers it.
 #[test]
 fn a_hollow_that_is_cut_open_is_covered() {
     let tube = |p: &Point3<f64>| {

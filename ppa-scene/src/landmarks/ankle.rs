@@ -1,4 +1,4 @@
-//! Where the ankle joint is: the gap between tibial plafond and talar dome.
+//! Position of the ankle joint: the gap between tibial plafond and talar dome.
 
 use nalgebra::{Point3, Vector3};
 
@@ -17,7 +17,7 @@ pub(crate) struct Ankle {
 }
 
 impl Ankle {
-    /// What is reported about it when the joint is taken to lie at a level.
+    /// Note about the ankle for a joint at the given level.
     pub(crate) fn note(&self, joint_mm: f64) -> LandmarkNote {
         LandmarkNote::AnkleFound {
             depth_hu: self.depth_hu,
@@ -48,7 +48,7 @@ const MIN_DEPTH_HU: f64 = 30.0;
 /// Follows the tibia from its thin shaft to the flare above the ankle and looks for the joint
 /// gap below: the first clear dip between two dense plates in a column along the shaft.
 ///
-/// `None` when there is no shaft with a second, thinner bone (the fibula) beside it, no flare or
+/// `None` if there is no shaft with a second, thinner bone (the fibula) next to it, no flare or
 /// no gap.
 pub(crate) fn find_ankle(sections: &Sections) -> Option<Ankle> {
     let slices = sections.proximal_to_distal();
@@ -96,7 +96,7 @@ struct Level {
 /// Level where the flare starts, and the shaft from there 40 mm up.
 ///
 /// A forearm's radius is thinner than any adult tibia, and a femur has only the short kneecap
-/// beside it: neither counts as a tibia.
+/// next to it: neither counts as a tibia.
 fn flare(sections: &Sections, slices: &[usize]) -> Option<(f64, Vec<Level>)> {
     const SUSTAINED_MM: f64 = 4.0;
     const SHAFT_MM: f64 = 40.0;
@@ -177,8 +177,8 @@ pub(crate) fn shaft_direction(sections: &Sections) -> Option<Vector3<f64>> {
 
 /// Whether a thinner bone runs along most of the shaft above a level.
 ///
-/// Only the proximal half counts: in coarse voxels the fibula hangs together with the tibia for some
-/// 40 mm above the flare, and the kneecap lies beside the flare of a femur.
+/// Only the proximal half counts: in coarse voxels the fibula is connected with the tibia for about
+/// 40 mm above the flare, and the kneecap is next to the flare of a femur.
 fn fibula_beside(levels: &[Level], top_mm: f64) -> bool {
     const ALONG_MM: f64 = 80.0;
     let mut shaft: Vec<&Level> = levels
@@ -223,7 +223,7 @@ impl ShaftLine {
     }
 }
 
-/// How far the lowest value of a local minimum lies below the plates on either side.
+/// Depth of a local minimum below the plates on either side.
 fn depth(column: &[(f64, f64)], i: usize) -> Option<f64> {
     let (level, hu) = column[i];
     let neighbour = |j: usize| column.get(j).map(|c| c.1);
@@ -290,7 +290,7 @@ mod tests {
         Volume::new(grid, hu).unwrap()
     }
 
-    /// Whatever lies above the calf: the ankle is where it is, and a knee alone is none.
+    /// The ankle is found whatever is above the calf, and a knee alone is not taken for one.
     #[test]
     fn a_thigh_does_not_hide_the_ankle() {
         for top_mm in [200.0, 320.0, 420.0] {

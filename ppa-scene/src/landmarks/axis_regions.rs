@@ -12,10 +12,10 @@ use crate::landmarks::limb_kind::LimbKind;
 use crate::landmarks::limb_sections::Sections;
 use crate::landmarks::notes::LandmarkNote;
 
-/// A region that is left open ends or begins this far from the one that is given, at least, mm.
+/// Smallest distance of an automatic region from a given one, mm.
 const APART_MM: f64 = 10.0;
 
-/// The calf region, moved so that it begins beyond a joint region that is given, and ends with the limb.
+/// The calf region, moved so that it begins beyond a given joint region, and ends with the limb.
 fn proximal_of(joint_ends: f64, [from, to]: [f64; 2], limb_ends: f64) -> [f64; 2] {
     let moved = (joint_ends + APART_MM - from).max(0.0);
     if moved == 0.0 {
@@ -24,7 +24,7 @@ fn proximal_of(joint_ends: f64, [from, to]: [f64; 2], limb_ends: f64) -> [f64; 2
     [from + moved, (to + moved).min(limb_ends).max(from + moved)]
 }
 
-/// What region ranges are measured from.
+/// Reference from which region ranges are measured.
 pub(crate) struct Reference<'a> {
     pub(crate) kind: LimbKind,
     pub(crate) sections: Sections<'a>,
@@ -41,7 +41,7 @@ pub(crate) struct Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
-    /// Finds the joint level, or takes the middle of a limb that was said to be another one.
+    /// Finds the joint level, or takes the middle of a limb given as another kind.
     pub(crate) fn find(
         volume: &'a Volume,
         mask: &'a [bool],
@@ -106,7 +106,7 @@ impl<'a> Reference<'a> {
         })
     }
 
-    /// The joint region, the calf region and what their centres are centres of.
+    /// The joint region, the calf region and the source of their centres.
     pub(crate) fn regions(
         &self,
         overrides: &LandmarkOverrides,
@@ -203,7 +203,7 @@ impl<'a> Reference<'a> {
                 ([at(0.15), at(0.35)], [at(0.65), at(0.85)])
             }
         };
-        // A region that is left open makes room for the one that is given.
+        // An automatic region makes room for a given one.
         Ok(match (overrides.joint_region, overrides.calf_region) {
             (None, None) => (joint, calf),
             (Some(joint), Some(calf)) => (joint, calf),
@@ -212,9 +212,9 @@ impl<'a> Reference<'a> {
         })
     }
 
-    /// The joint region, moved or drawn together so that it ends before a calf region that is given.
+    /// The joint region, moved or shortened so that it ends before a given calf region.
     fn distal_of(&self, calf_begins: f64, [from, to]: [f64; 2]) -> [f64; 2] {
-        // Drawn together any further, both regions would lie in the joint.
+        // Shortened any further, both regions would be in the joint.
         const LEAST_SCALE: f64 = 0.3;
         let scale = (calf_begins - APART_MM) / to;
         match self.kind {
@@ -235,7 +235,7 @@ impl<'a> Reference<'a> {
         source: AxisSource,
     ) -> Result<AxisRegion, LandmarkError> {
         let [from_mm, to_mm] = range_mm;
-        // A level that went through a file and back may have lost its last bit.
+        // A level read back from a file may have lost its last bit.
         let there = |level: f64| (from_mm - 1e-6..=to_mm + 1e-6).contains(&(level - self.level_mm));
         let (mut sum, mut count) = (Vector3::zeros(), 0_u32);
         if source == AxisSource::Bone && !self.bones.is_empty() {

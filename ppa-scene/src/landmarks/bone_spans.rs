@@ -47,7 +47,7 @@ impl Lengthwise {
 pub(crate) struct Span {
     pub(crate) level_mm: f64,
     pub(crate) hull: Hull,
-    /// Whether a second bone as thick as a fibula lies beside it.
+    /// Whether a second bone as thick as a fibula is next to it.
     pub(crate) has_fibula: bool,
     /// Whether it reaches a face of the scan, so that part of it may be missing.
     pub(crate) is_cut: bool,
@@ -170,10 +170,10 @@ impl BroadZone {
         spans.iter().filter(there).collect()
     }
 
-    /// The shafts of a thigh and a lower leg, of which at least one must be seen; `None` when the bones beyond are
-    /// none of these: a femur is alone, a tibia has the fibula beside it.
+    /// The shafts of a thigh and a lower leg, at least one of which must be visible; `None` if the bones beyond are
+    /// neither: a femur is single, a tibia has the fibula next to it.
     pub(crate) fn shafts(&self, spans: &[Span], frame: &Lengthwise) -> Option<Shafts> {
-        /// The fibula of a lower leg above an ankle hangs together with the tibia for some 40 mm in coarse voxels.
+        /// The fibula of a lower leg above an ankle is connected with the tibia for about 40 mm in coarse voxels.
         const FEMUR_MM: [f64; 2] = [20.0, 100.0];
         const TIBIA_MM: [f64; 2] = [15.0, 75.0];
         /// Enough to recognise a shaft, and to measure how it leans.

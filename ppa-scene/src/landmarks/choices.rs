@@ -1,4 +1,4 @@
-//! A person's choices about a limb, and errors of landmarks.
+//! User choices for a limb, and errors of landmarks.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 use crate::landmarks::found::{AxisSource, Landmarks};
 use crate::landmarks::limb_kind::{Joint, LimbKind};
 
-/// Choices of a person that replace the automatic ones; what is `None` stays automatic.
+/// User choices that replace the automatic ones; `None` keeps the automatic choice.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LandmarkOverrides {
-    /// What the scan shows; by default a lower leg if an ankle is found, else a knee if one is.
+    /// Kind of limb; by default a lower leg if an ankle is found, otherwise a knee if one is.
     pub limb: Option<LimbKind>,
     /// The joint centre, `ct` frame, mm; the axis is moved parallel to itself to pass through it.
     pub joint_centre: Option<[f64; 3]>,
@@ -18,7 +18,7 @@ pub struct LandmarkOverrides {
     pub joint_region: Option<[f64; 2]>,
     /// The same for the calf region.
     pub calf_region: Option<[f64; 2]>,
-    /// What the region centres are taken from.
+    /// Source of the region centres.
     pub axis_source: Option<AxisSource>,
     /// Two points that the axis runs through, `ct` frame, mm, instead of the regions' centres. The joint
     /// is then the point of this axis nearest to [`Self::joint_centre`], or at the joint's level.
@@ -31,7 +31,7 @@ pub struct LandmarkOverrides {
 }
 
 impl Landmarks {
-    /// What a person may still choose beside what is `given`, as it was found: keys that exclude a given one are left out.
+    /// The found values of the choices that are still open besides the `given` ones: keys that exclude a given one are left out.
     pub fn open_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
         let by_regions = given.axis.is_none();
         let by_axis = given.joint_region.is_none()
@@ -54,13 +54,13 @@ impl Landmarks {
     }
 }
 
-/// What was found, where nothing is given.
+/// The found value if none is given.
 fn open<T>(given: Option<T>, found: T) -> Option<T> {
     given.is_none().then_some(found)
 }
 
 impl LandmarkOverrides {
-    /// Refuses numbers that are not finite, regions that run backwards and a front without
+    /// Rejects numbers that are not finite, regions that run backwards and a front without
     /// direction.
     pub(crate) fn check(&self) -> Result<(), LandmarkError> {
         let by_regions = [
@@ -126,7 +126,7 @@ impl LandmarkOverrides {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LandmarkError {
-    /// The scan cannot be cut across a limb that lies aslant in it.
+    /// The scan cannot be cut across a limb that is oblique in it.
     #[error("the scan cannot be cut across the limb's shaft")]
     Reslice(#[from] ppa_ct::VolumeError),
     /// The mask is not one value per voxel.
@@ -154,32 +154,32 @@ pub enum LandmarkError {
         /// Its index.
         vertex: usize,
     },
-    /// A lower leg was asked for but shows no ankle.
+    /// A lower leg was requested but shows no ankle.
     #[error(
         "no ankle found: no tibia and fibula that widen to a joint gap; give the joint centre, \
          or the limb kind \"other\""
     )]
     NoAnkle,
-    /// A knee was asked for but none is seen.
+    /// A knee was requested but none is found.
     #[error(
         "no knee found: no femoral condyles with a notch between them above a joint gap and a tibial plateau; give the \
          joint centre, or the limb kind \"other\""
     )]
     NoKnee,
-    /// One joint was asked for, the limb shows the other one.
+    /// One joint was requested, but the limb shows the other one.
     #[error(
         "no {asked} found, but the {found} is near {:.0}, {:.0}, {:.0} mm (LPS): give --limb {}, or the centre of the \
          {asked} with --joint", at_mm[0], at_mm[1], at_mm[2], limb_of(*found)
     )]
     OtherJoint {
-        /// What was asked for.
+        /// Requested joint.
         asked: Joint,
-        /// What is there.
+        /// Joint found.
         found: Joint,
         /// Its centre, `ct` frame.
         at_mm: [f64; 3],
     },
-    /// Nothing was asked for and neither joint is seen.
+    /// Nothing was requested and neither joint is found.
     #[error(
         "neither an ankle (tibia and fibula that widen to a gap above the talus) nor a knee (condyles, gap and tibial \
          plateau) found: give the joint centre with --joint, or --limb other to rotate the limb about the middle of its length"
@@ -224,7 +224,7 @@ pub enum LandmarkError {
         /// What is wrong with it.
         problem: &'static str,
     },
-    /// A direction or point given by a person cannot be used.
+    /// A direction or point given by the user cannot be used.
     #[error("{name} is {}, expected {expected}", ppa_core::text::numbers(*found))]
     Override {
         /// Field of [`LandmarkOverrides`].
@@ -234,7 +234,7 @@ pub enum LandmarkError {
         /// What it should be.
         expected: &'static str,
     },
-    /// A joint centre given by a person lies far from the limb.
+    /// A joint centre given by the user is far from the limb.
     #[error(
         "joint_centre is {found:?}, {distance_mm:.0} mm outside the limb, expected at most {most_mm:.0} mm; the limb \
          reaches from {low:.0?} to {high:.0?} mm"
@@ -251,7 +251,7 @@ pub enum LandmarkError {
         /// High corner of the box around the limb, mm.
         high: [f64; 3],
     },
-    /// An anterior direction given by a person runs along the limb.
+    /// An anterior direction given by the user runs along the limb.
     #[error(
         "anterior is {found:?}, {angle_deg:.0} degrees from the limb's axis, expected at least {least_deg:.0}: it is the \
          direction that faces up at angle 0, across the limb"
@@ -270,10 +270,10 @@ pub enum LandmarkError {
         /// Field of [`LandmarkOverrides`].
         other: &'static str,
     },
-    /// The axis is said to be given, but is not.
+    /// The axis source is "given", but no axis is given.
     #[error("axis_source is \"given\", but axis is missing: give its two points")]
     NoAxis,
-    /// Two points given by a person make no axis along the limb.
+    /// Two points given by the user do not form an axis along the limb.
     #[error("axis runs from {from:?} to {to:?}, expected {expected}")]
     Axis {
         /// The first point.
@@ -283,7 +283,7 @@ pub enum LandmarkError {
         /// What they should be.
         expected: &'static str,
     },
-    /// Three points given by a person make no plane under the limb.
+    /// Three points given by the user do not form a plane under the limb.
     #[error(
         "plane_points are ({}), ({}) and ({}), expected {expected}",
         ppa_core::text::numbers(found[0]), ppa_core::text::numbers(found[1]), ppa_core::text::numbers(found[2])
@@ -297,7 +297,7 @@ pub enum LandmarkError {
     /// No plane touches both ends of the limb from below.
     #[error("no plane under the limb touches both its ends; give three plane points")]
     NoSupport,
-    /// The plane given by a person has the limb on its back.
+    /// Most of the limb is behind the plane given by the user.
     #[error(
         "{behind_percent:.0} % of the limb lies behind the plane through the plane points, expected less than half"
     )]
@@ -307,7 +307,7 @@ pub enum LandmarkError {
     },
 }
 
-/// The value of `--limb` that takes a joint.
+/// The value of `--limb` that selects a joint.
 fn limb_of(joint: Joint) -> &'static str {
     match joint {
         Joint::Ankle => "lower-leg",

@@ -7,21 +7,21 @@ use crate::landmarks::bone_spans::{Lengthwise, Span};
 use crate::landmarks::hull::longest;
 use crate::landmarks::knee_gap::density;
 
-/// Spongy bone of condyles and plateau from here on; muscle with contrast agent stays below.
+/// Smallest HU of spongy bone in condyles and plateau; muscle with contrast agent stays below.
 const SOLID_HU: f64 = 130.0;
 
-/// Cortex of the condyles from here on, as for bone elsewhere.
+/// Smallest HU of cortex in the condyles, as for bone elsewhere.
 const CORTEX_HU: f64 = 200.0;
 
-/// Which way a knee faces; across the limb, in coordinates of a [`Lengthwise`].
+/// Direction in which a knee faces, across the limb, in coordinates of a [`Lengthwise`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Facing {
     /// Unit direction to the back.
     pub(crate) posterior: Vector2<f64>,
     /// Middle of the intercondylar notch from side to side: its place along [`Self::aside`].
     pub(crate) notch_mm: f64,
-    /// Whether [`Self::posterior`] is square to the posterior condylar line; else to the longest extent of the bones, since
-    /// the scan does not show the back of both condyles.
+    /// Whether [`Self::posterior`] is perpendicular to the posterior condylar line; otherwise to the longest extent of the bones,
+    /// since the scan does not show the back of both condyles.
     pub(crate) by_condyles: bool,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Condyles<'a> {
 }
 
 impl Condyles<'_> {
-    /// Which way the knee faces; `None` when no notch opens to the back above the gap, or when one does below it: no knee,
+    /// Direction in which the knee faces; `None` if no notch opens to the back above the gap, or if one does below it: no knee,
     /// or one upside down.
     pub(crate) fn facing(&self) -> Option<Facing> {
         let weight: f64 = self.broad.iter().map(|span| span.hull.area_mm2).sum();
@@ -144,7 +144,7 @@ impl Condyles<'_> {
         points
     }
 
-    /// Unit direction to the back square to the line that touches both condyles from behind; `None` when the scan cuts one.
+    /// Unit direction to the back, perpendicular to the line that touches both condyles from behind; `None` if the scan cuts one.
     fn condylar_line(
         &self,
         rear: &[Vector2<f64>],

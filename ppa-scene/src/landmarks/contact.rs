@@ -3,7 +3,7 @@
 /// The paper's τ: both ends count as resting when their heights differ by less, mm.
 pub(crate) const TAU_MM: f64 = 0.05;
 
-/// A limb on a table does not tip by more; 60 degrees.
+/// Largest tilt of a limb on a table: 60 degrees.
 const MAX_TILT_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
 /// A limb seen from the side: (towards proximal, up) relative to the joint centre, mm.
@@ -77,7 +77,7 @@ impl Profile {
     /// and look for the closest points again. `None` when the limb would tip by more than
     /// [`MAX_TILT_RAD`], or all of it lies on one side of the split.
     ///
-    /// The loop ends, and there is one such tilt only, because front and back are split across
+    /// The loop ends, and there is only one such tilt, because front and back are split across
     /// the table. With t the tangent of the tilt, F(t) = min over distal (z + t y) − min over
     /// proximal (z + t y) is piecewise linear; measured from the split, its slope −(d + p) is
     /// negative, −d < 0 ≤ p being the y of the closest points. The paper's step is Newton's,

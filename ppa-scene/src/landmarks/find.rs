@@ -19,12 +19,12 @@ use crate::room::plane::first_not_finite;
 /// Finds joint level, rotation axis and supporting plane of a limb.
 ///
 /// `limb` is the skin in the `ct` frame, `mask` one value per voxel of `volume`: whether it
-/// belongs to the limb. Scans are patient scans (LPS), so proximal is superior; only when a leg
-/// shows its joint the other way round is it turned.
+/// belongs to the limb. Scans are patient scans (LPS), so proximal is superior; a limb is reversed
+/// only if a leg shows its joint the other way round.
 ///
-/// * Kind: a lower leg where an ankle is found, else a knee where one is; every joint found is in
+/// * Kind: a lower leg if an ankle is found, otherwise a knee if one is; every joint found is in
 ///   [`Landmarks::joints`]. Another limb only on request, or about a given joint centre.
-/// * Slices: the scan's own; where the shaft leans in them by more than 3 degrees, interpolated ones
+/// * Slices: the scan's own; if the shaft is inclined in them by more than 3 degrees, interpolated ones
 ///   across it.
 /// * Joint level of a lower leg: the gap between plafond and talar dome in a column along the
 ///   tibia's shaft. Of a knee: the gap between condyles and plateau, half-way between its two
@@ -35,11 +35,11 @@ use crate::room::plane::first_not_finite;
 ///   to pass through the joint and a swelling moves the centre of the skin; without bone, or on
 ///   request, they are those of the limb's cross-sections. Two given points replace them.
 /// * Axis of a knee: through the centre of the tibial plateau, along the tibia's shaft, 65 to 95 mm and
-///   110 to 150 mm distal of the joint. For an AP radiograph of the knee the leg is turned about its
-///   long axis from hip to ankle, along which the tibia runs; the femur's shaft, which leans from it
-///   by about 6 degrees, takes its place where less than 100 mm of tibia are seen, and both together where too
+///   110 to 150 mm distal of the joint. For an AP radiograph of the knee the leg is rotated about its
+///   long axis from hip to ankle, along which the tibia runs; the femur's shaft, which is inclined to it
+///   by about 6 degrees, replaces it if less than 100 mm of tibia are visible, and both are used together if too
 ///   little of either is.
-/// * Anterior: −y of the scan across the axis, so that angle 0 is the pose in the scan. Of a knee: square to the
+/// * Anterior: −y of the scan across the axis, so that angle 0 is the pose in the scan. Of a knee: perpendicular to the
 ///   posterior condylar line, so that at angle 0 both condyles are equally far from the table; ±y of the scan
 ///   where the scan cuts a condyle.
 /// * Π_P: the plane that touches the limb from behind at its lowest distal and proximal points
@@ -154,7 +154,7 @@ pub fn find_landmarks(
     Ok(landmarks)
 }
 
-/// The front of a knee: square to the line behind its condyles; the scan's where that line is not seen.
+/// The front of a knee: perpendicular to the posterior condylar line, or that of the scan if the line is not visible.
 fn front_of(knee: &Knee, notes: &mut Vec<LandmarkNote>) -> Vector3<f64> {
     if knee.by_condyles {
         return knee.anterior;

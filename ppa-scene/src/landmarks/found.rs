@@ -9,17 +9,17 @@ use crate::landmarks::limb_kind::{Joint, LimbKind};
 use crate::landmarks::notes::LandmarkNote;
 use crate::room::plane::Plane;
 
-/// A joint that the limb shows, whether it is the one it is posed about or not; `ct` frame.
+/// A joint that the limb shows, whether or not the limb is posed about it; `ct` frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FoundJoint {
-    /// Which one.
+    /// The joint.
     pub joint: Joint,
-    /// Where, mm: the point of the tibia's shaft in the gap of an ankle, the middle of the plateau in that of a knee.
+    /// Position, mm: the point of the tibia's shaft in the gap of an ankle, the middle of the plateau in that of a knee.
     pub centre_mm: [f64; 3],
     /// How clear the joint space is: how much less dense than the thinner bone plate next to it, HU.
     pub gap_depth_hu: f64,
-    /// What else is known of a knee.
+    /// Further findings for a knee.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lines: Option<KneeLines>,
 }
@@ -45,7 +45,7 @@ pub enum AxisSource {
     Bone,
     /// The whole cross-section inside the skin.
     Limb,
-    /// Two points that a person gave.
+    /// Two points given by the user.
     Given,
 }
 
@@ -59,15 +59,15 @@ pub struct AxisRegion {
     pub centre_mm: [f64; 3],
 }
 
-/// Every choice made about one limb; all in the `ct` frame, mm.
+/// Choices made for one limb; all in the `ct` frame, mm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Landmarks {
-    /// Which limb.
+    /// Side of the limb.
     pub side: Side,
-    /// What was recognised.
+    /// Kind of limb.
     pub limb: LimbKind,
-    /// What the two region centres are taken from.
+    /// Source of the two region centres.
     pub axis_source: AxisSource,
     /// Unit normal of the slices, towards proximal: of the scan's own, or, where the shaft is inclined by more than 3 degrees, of slices
     /// across the shaft; region ranges run along it.
@@ -89,7 +89,7 @@ pub struct Landmarks {
     /// What was decided and why; files contain it as findings of the limb.
     #[serde(skip)]
     pub notes: Vec<LandmarkNote>,
-    /// The joints that were found, from distal to proximal; none are searched for in a limb that was given as `other`.
+    /// The joints found, from distal to proximal; not searched for in a limb given as `other`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<FoundJoint>,
 }
@@ -117,7 +117,7 @@ impl Landmarks {
             return Err("three points that are not on one line");
         }
         let plane = self.plane_patient();
-        // The normal lies within 64 degrees of across the limb's axis.
+        // The normal is within 64 degrees of perpendicular to the limb's axis.
         (plane.normal.z.abs() <= 0.9)
             .then_some(plane)
             .ok_or("three points of a plane along the limb")

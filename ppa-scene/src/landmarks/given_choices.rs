@@ -6,11 +6,11 @@ use ppa_ct::Volume;
 use crate::landmarks::choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::notes::LandmarkNote;
 
-/// A joint may lie this far outside of what the scan shows of the limb, mm: about half the thickness of
-/// a knee, of which the field of view can cut away one side.
+/// Largest distance of a joint from the part of the limb in the scan, mm: about half the thickness of
+/// a knee, one side of which the field of view can cut away.
 const JOINT_MOST_MM: f64 = 60.0;
 
-/// An anterior direction less far from the axis than this is taken for a mistake, degrees: its part across the
+/// An anterior direction closer to the axis than this is considered a mistake, degrees: its component across the
 /// axis would be less than half of it.
 const ANTERIOR_LEAST_DEG: f64 = 30.0;
 
@@ -47,7 +47,7 @@ pub(crate) fn check_joint(
 
 /// Refuses an anterior direction along the axis, and notes one that points to the patient's back.
 ///
-/// The scan's own direction is only refused where its part across the axis means nothing.
+/// The scan's own direction is only refused if its component across the axis is too small to use.
 pub(crate) fn check_anterior(
     anterior: &Vector3<f64>,
     axis: &Vector3<f64>,

@@ -88,7 +88,7 @@ fn half<'a>(points: impl Iterator<Item = &'a Vector2<f64>>) -> Vec<Vector2<f64>>
 mod tests {
     use super::*;
 
-    /// A turned rectangle of 30 x 10 mm with points inside.
+    /// A rotated rectangle of 30 x 10 mm with points inside.
     #[test]
     fn area_centre_and_moments_are_those_of_a_rectangle() {
         let (along, aside) = (Vector2::new(0.6, 0.8), Vector2::new(-0.8, 0.6));

@@ -12,16 +12,16 @@ use crate::landmarks::limb_kind::{Joint, LimbKind};
 use crate::landmarks::limb_sections::Sections;
 use crate::landmarks::notes::LandmarkNote;
 
-/// What was found, each with slices across the shaft beside it.
+/// Joints found, each with slices across its shaft.
 pub(crate) struct Joints<'a> {
     pub(crate) ankle: Option<(Sections<'a>, Ankle)>,
     pub(crate) knee: Option<FoundKnee<'a>>,
 }
 
 impl<'a> Joints<'a> {
-    /// Looks for both joints, first with proximal superior; only where neither shows, the other way round.
+    /// Looks for both joints, first with proximal superior, then the other way round if neither is found.
     ///
-    /// Upside down a knee looks like an ankle to what follows a tibia to its flare: what is found at the gap of a knee
+    /// Upside down, a knee looks like an ankle to the search along the tibia, so anything found at the gap of a knee
     /// is not an ankle.
     pub(crate) fn find(volume: &'a Volume, mask: &'a [bool]) -> Result<Self, LandmarkError> {
         let up = Vector3::z();
@@ -45,7 +45,7 @@ impl<'a> Joints<'a> {
         Ok(Self::none())
     }
 
-    /// Of a limb in which none is looked for.
+    /// No joints, for a limb in which none is searched for.
     pub(crate) fn none() -> Self {
         Self {
             ankle: None,
@@ -53,7 +53,7 @@ impl<'a> Joints<'a> {
         }
     }
 
-    /// For the record, from distal to proximal.
+    /// The joints found, from distal to proximal.
     pub(crate) fn found(&self) -> Vec<FoundJoint> {
         let ankle = self.ankle.iter().map(|(_, ankle)| FoundJoint {
             joint: Joint::Ankle,
@@ -125,7 +125,7 @@ fn is_at(ankle: &Ankle, knee: &Knee) -> bool {
     (ankle.centre - knee.centre).norm() < NEAR_MM
 }
 
-/// What kind of limb it is: the one that was asked for, else that of the joint that was found, an ankle before a knee.
+/// Kind of limb: the requested one, otherwise that of the joint found, an ankle before a knee.
 pub(crate) fn kind_of_limb(
     overrides: &LandmarkOverrides,
     found: &[FoundJoint],
@@ -161,7 +161,7 @@ pub(crate) fn kind_of_limb(
     )
 }
 
-/// What else the scan shows, and how well it shows the joint the limb is posed about.
+/// Notes on other joints in the scan, and on how well it shows the joint the limb is posed about.
 pub(crate) fn joint_notes(kind: LimbKind, found: &[FoundJoint]) -> Vec<LandmarkNote> {
     let posed = match kind {
         LimbKind::LowerLeg => Some(Joint::Ankle),

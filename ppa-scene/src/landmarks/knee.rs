@@ -1,4 +1,4 @@
-//! Where the knee joint is: the gap between femoral condyles and tibial plateau.
+//! Position of the knee joint: the gap between femoral condyles and tibial plateau.
 
 use nalgebra::{Point3, Vector2, Vector3};
 use ppa_ct::{Volume, VolumeError};
@@ -19,14 +19,14 @@ pub(crate) struct Knee {
     pub(crate) joint_line: Vector3<f64>,
     /// Unit direction to the front, across the limb.
     pub(crate) anterior: Vector3<f64>,
-    /// Whether [`Self::anterior`] is square to the line behind the condyles: the scan shows the back of both.
+    /// Whether [`Self::anterior`] is perpendicular to the posterior condylar line: the scan shows the back of both condyles.
     pub(crate) by_condyles: bool,
-    /// Whether the scan cuts the plateau, so that the middle of the notch between the condyles or of the gap stands for
+    /// Whether the scan cuts the plateau, so that the middle of the notch between the condyles or of the gap replaces
     /// its centre.
     pub(crate) is_cut: bool,
 }
 
-/// A knee with what its axis follows from.
+/// A knee with the data from which its axis is derived.
 pub(crate) struct FoundKnee<'a> {
     pub(crate) knee: Knee,
     /// Slices across the shaft.
@@ -38,8 +38,8 @@ pub(crate) struct FoundKnee<'a> {
 /// Looks for a knee in a limb: a stretch of bone as broad as condyles and plateau, a single shaft above or one with a
 /// fibula below, a gap through most of its columns, and a notch that opens to the back above that gap only.
 ///
-/// `None` when there is no such place. The slices that come with it lie across the tibia's shaft, or across the
-/// femur's where less than 25 mm of the tibia's are seen.
+/// `None` if there is no such place. The returned slices are across the tibia's shaft, or across the
+/// femur's if less than 25 mm of the tibia's are visible.
 ///
 /// # Errors
 /// When the scan cannot be cut across the shaft.
@@ -85,8 +85,8 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// The same stretch in slices across the shaft, where it leans by more than 3 degrees; `None` when the bones beyond are
-    /// no shafts of a leg.
+    /// The same stretch in slices across the shaft, if it is inclined by more than 3 degrees; `None` if the bones beyond are
+    /// not shafts of a leg.
     fn across_the_shaft(
         mut self,
         volume: &Volume,

@@ -12,7 +12,7 @@ pub enum KneeAxis {
 }
 
 impl KneeAxis {
-    /// By the joint region and the far region, mm proximal of the joint level.
+    /// Derived from the joint region and the far region, mm proximal of the joint level.
     pub(crate) fn of([near, far]: [[f64; 2]; 2]) -> Self {
         match (near[1] <= 0.0, far[1] <= 0.0) {
             (true, true) => Self::Tibia,

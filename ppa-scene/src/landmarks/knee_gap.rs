@@ -23,7 +23,7 @@ pub(crate) fn density(
     Some(sum / offsets.len() as f64)
 }
 
-/// Where a column passes the gap.
+/// Point where a column crosses the gap.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GapPoint {
     pub(crate) place: Vector2<f64>,
@@ -33,7 +33,7 @@ pub(crate) struct GapPoint {
     pub(crate) depth_hu: f64,
 }
 
-/// The gap, as far as columns pass it.
+/// The gap, as the points where columns cross it.
 #[derive(Debug, Clone)]
 pub(crate) struct Gap {
     pub(crate) points: Vec<GapPoint>,
@@ -42,7 +42,7 @@ pub(crate) struct Gap {
 /// Distance of neighbouring columns, mm.
 const COLUMN_MM: f64 = 3.0;
 
-/// Levels of a column are looked at in these steps, mm.
+/// Step between the levels of a column, mm.
 const STEP_MM: f64 = 1.0;
 
 /// Plates lie within this distance of the middle of the gap, mm.
@@ -56,7 +56,7 @@ const MIN_DEPTH_HU: f64 = 80.0;
 const MIN_GAP_MM2: f64 = 300.0;
 
 impl Gap {
-    /// Looks for the one nearly level gap that most columns between two places and two levels pass; `None` when too
+    /// Looks for the nearly level gap that most columns between two places and two levels cross; `None` if too
     /// few do.
     pub(crate) fn find(
         volume: &Volume,
@@ -155,13 +155,13 @@ fn deepest_dip(
     })
 }
 
-/// The points near the plane that most of them, weighted by depth, lie on.
+/// The points near the plane that contains most of them, weighted by depth.
 fn nearly_level(points: Vec<GapPoint>) -> Option<Vec<GapPoint>> {
     /// A plateau slopes by 10 degrees to the back: 4 mm on 25 mm.
     const FIRST_MM: f64 = 7.0;
     const LAST_MM: f64 = 4.0;
     const ROUNDS: usize = 8;
-    /// Metal beside a gap does not outweigh all other columns.
+    /// Metal next to a gap does not outweigh all other columns.
     const MOST_HU: f64 = 500.0;
     let weight = |point: &GapPoint| point.depth_hu.min(MOST_HU);
     let support = |level: f64| {

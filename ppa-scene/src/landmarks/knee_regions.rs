@@ -5,12 +5,12 @@ use crate::landmarks::choices::LandmarkError;
 /// Joint region and far region of a knee, mm proximal of the joint level; `extent_mm` is how far the limb reaches distal
 /// (below 0) and proximal of it.
 ///
-/// For an AP radiograph the leg is turned about its long axis, from hip to ankle. The tibia's shaft runs along it
-/// within about 2 degrees; the femur's leans from it by about 6 degrees to the outside. So the tibia gives the axis where at least
-/// 100 mm of it are seen, else the femur; where the scan shows 50 mm on either side, both together do.
+/// For an AP radiograph the leg is rotated about its long axis, from hip to ankle. The tibia's shaft runs along it
+/// within about 2 degrees; the femur's is inclined to it by about 6 degrees to the outside. So the tibia gives the axis if at least
+/// 100 mm of it are visible, otherwise the femur; if the scan shows 50 mm on either side, both together do.
 ///
 /// # Errors
-/// [`LandmarkError::ShortKnee`] when it shows less.
+/// [`LandmarkError::ShortKnee`] if it shows less.
 pub(crate) fn knee_ranges(extent_mm: [f64; 2]) -> Result<[[f64; 2]; 2], LandmarkError> {
     // Nearer than 65 mm the tibia flares to plateau and tuberosity, nearer than 75 mm the femur to its condyles.
     const TIBIA_MM: [[f64; 2]; 2] = [[-95.0, -65.0], [-150.0, -110.0]];
@@ -52,7 +52,7 @@ mod tests {
         assert!(matches!(short, LandmarkError::ShortKnee { .. }), "{short}");
     }
 
-    /// Regions never leave the limb, whatever of it is seen.
+    /// Regions never leave the limb, whichever part of it is visible.
     #[test]
     fn regions_lie_inside_the_limb_and_apart() {
         for distal in [0.0, 50.0, 99.0, 100.0, 120.0, 400.0] {

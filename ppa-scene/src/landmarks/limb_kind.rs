@@ -14,7 +14,7 @@ pub enum LimbKind {
     Other,
 }
 
-/// A joint that is looked for.
+/// A joint to be found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Joint {

@@ -11,7 +11,7 @@ use crate::landmarks::reslice::Resliced;
 /// HU from which a voxel is bone; trabecular bone next to a joint starts near 150 to 200.
 const BONE_HU: f32 = 200.0;
 
-/// Tibia and fibula hang together in coarse voxels over necks narrower than twice this, mm.
+/// Tibia and fibula are connected in coarse voxels by necks narrower than twice this, mm.
 const NECK_MM: f64 = 3.0;
 
 /// Slices of a limb across the scan's limb direction, numbered as in the volume.
@@ -34,7 +34,7 @@ pub(crate) struct BoneSection {
 }
 
 impl<'a> Sections<'a> {
-    /// Slices along the grid axis that runs best along `towards_proximal`.
+    /// Slices along the grid axis closest to `towards_proximal`.
     pub(crate) fn along(
         volume: &'a Volume,
         mask: &'a [bool],
@@ -60,7 +60,7 @@ impl<'a> Sections<'a> {
         }
     }
 
-    /// Slices across `towards_proximal` of a limb that lies aslant in the scan, interpolated.
+    /// Slices across `towards_proximal` of a limb that is oblique in the scan, interpolated.
     pub(crate) fn across(
         volume: &Volume,
         mask: &[bool],
@@ -141,7 +141,7 @@ impl<'a> Sections<'a> {
         bones
     }
 
-    /// Voxels with bone of a slice, apart where nothing joins them; centres in the `ct` frame.
+    /// Connected pieces of bone in a slice, as centres of their voxels in the `ct` frame.
     pub(crate) fn bone_pieces(&self, slice: usize) -> Vec<Vec<Point3<f64>>> {
         let (nu, nv) = self.extent();
         let mut open = self.bone_pixels(slice);

@@ -3,7 +3,7 @@
 use crate::landmarks::knee_axis::KneeAxis;
 use crate::landmarks::limb_kind::Joint;
 
-/// A fact about the landmarks of a limb, for the person who judges them.
+/// A fact about the landmarks of a limb, for the user to judge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum LandmarkNote {
@@ -11,25 +11,25 @@ pub enum LandmarkNote {
     AnkleFound {
         /// How much darker the gap is than the bone on either side, HU.
         depth_hu: f64,
-        /// How far the joint lies proximal of the gap: 0 unless a person gave the joint, mm.
+        /// How far the joint is proximal of the gap: 0 unless the user gave the joint, mm.
         joint_above_mm: f64,
     },
     /// The scan shows another joint than the one the limb is posed about.
     OtherJoint {
-        /// Which one.
+        /// The other joint.
         joint: Joint,
         /// Its centre, `ct` frame, mm.
         at_mm: [f64; 3],
     },
-    /// The scan cuts the tibial plateau of a knee: the notch between its condyles stands for the middle.
+    /// The scan cuts the tibial plateau of a knee: the notch between its condyles replaces the middle.
     PlateauCut,
     /// Which shafts give the axis of a knee.
     KneeAxis(KneeAxis),
-    /// The scan does not show the back of both condyles: the front of a knee is the scan's.
+    /// The scan does not show the back of both condyles: the front of a knee is that of the scan.
     CondylesNotSeen,
-    /// The joint given by a person, or found, lies beside an axis that a person gave, and was moved on to it.
+    /// The joint, given by the user or found, is off an axis given by the user, and was moved onto it.
     JointMovedToAxis {
-        /// How far, mm.
+        /// Distance moved, mm.
         aside_mm: f64,
     },
     /// The joint centre lies outside of the limb.
@@ -42,11 +42,11 @@ pub enum LandmarkNote {
         /// Angle to the scan's anterior direction (−y) across the axis, degrees.
         angle_deg: f64,
     },
-    /// A person gave the supporting plane.
+    /// The user gave the supporting plane.
     PlaneGiven {
         /// Share of the skin behind it.
         behind_percent: f64,
-        /// How far that reaches behind it, mm.
+        /// Largest distance of the skin behind it, mm.
         deepest_mm: f64,
     },
 }

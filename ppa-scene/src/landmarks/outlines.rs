@@ -3,8 +3,8 @@
 /// A pixel (u, v).
 pub(crate) type Pixel = (usize, usize);
 
-/// Pixels (u, v) that hang together with `start`; `take` says whether a pixel belongs and must
-/// do so only once per pixel.
+/// Pixels (u, v) connected with `start`; `take` tells whether a pixel belongs and must return true
+/// only once per pixel.
 pub(crate) fn flood(
     start: usize,
     (nu, nv): (usize, usize),
@@ -55,11 +55,11 @@ pub(crate) fn filled(pixels: &[Pixel]) -> Vec<Pixel> {
         .collect()
 }
 
-/// The parts of a filled set that necks narrower than `2 · reach_mm` join; the set itself when
+/// The parts of a filled set that are joined by necks narrower than `2 · reach_mm`; the set itself if
 /// there are none.
 ///
-/// What is farther than `reach_mm` from the outside falls apart there; each piece, grown back, is a
-/// part. `pixel_mm` are the sides of a pixel.
+/// Pixels farther than `reach_mm` from the outside form separate pieces there; each piece, grown back, is
+/// a part. `pixel_mm` are the sides of a pixel.
 pub(crate) fn parts(pixels: Vec<Pixel>, pixel_mm: [f64; 2], reach_mm: f64) -> Vec<Vec<Pixel>> {
     let bound = |pick: fn(&Pixel) -> usize| pixels.iter().map(pick).max().unwrap_or(0) + 1;
     let (nu, nv) = (bound(|p| p.0), bound(|p| p.1));

@@ -9,14 +9,14 @@ use crate::room::plane::across;
 pub(crate) struct Resliced {
     pub(crate) volume: Volume,
     pub(crate) mask: Vec<bool>,
-    /// Slices at the proximal end that the end of the scan cuts aslant.
+    /// Slices at the proximal end that the end of the scan cuts obliquely.
     pub(crate) cut: Vec<bool>,
 }
 
 /// Air, for places outside the scan.
 const OUTSIDE_HU: f32 = -1000.0;
 
-/// Finer voxels than these show nothing more about a tibia, mm.
+/// Voxels finer than this add nothing about a tibia, mm.
 const FINEST_MM: f64 = 1.0;
 
 impl Resliced {
@@ -66,7 +66,7 @@ impl Resliced {
 }
 
 /// The most proximal slice that shows the whole limb: nine tenths of the largest section that
-/// follows within 60 mm, which a cut aslant through a calf spans.
+/// follows within 60 mm, the span of an oblique cut through a calf.
 fn proximal_whole(areas: &[usize], spacing_mm: f64) -> usize {
     let window = (60.0 / spacing_mm) as usize;
     let is_whole = |slice: &usize| {

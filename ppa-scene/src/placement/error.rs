@@ -1,4 +1,4 @@
-//! Why a limb cannot be laid on the table.
+//! Errors of placing a limb on the table.
 
 use nalgebra::Point3;
 
@@ -8,13 +8,13 @@ use crate::room::plane::{first_not_finite, on_one_line};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaceError {
-    /// Nothing to place.
+    /// The limb has too few points.
     #[error("the limb has {}, expected at least 3", ppa_core::text::count(*found, "point"))]
     TooFewPoints {
         /// Points given.
         found: usize,
     },
-    /// There is no limb without width.
+    /// The limb has no width.
     #[error("all {found} points of the limb lie on one line, expected a surface")]
     OneLine {
         /// Points given.
@@ -29,7 +29,7 @@ pub enum PlaceError {
     /// The rotation angle is not a number, or more than a full turn; radians.
     #[error("the rotation is {} degrees, expected -360 to 360", .0.to_degrees())]
     Angle(f64),
-    /// A depth of soft tissue does not make sense.
+    /// A depth of soft tissue is out of range.
     #[error("{name} of the soft tissue is {found_mm} mm, expected 0 to 20")]
     SoftTissue {
         /// Field of [`SoftTissue`](crate::SoftTissue).
@@ -37,14 +37,14 @@ pub enum PlaceError {
         /// Its value.
         found_mm: f64,
     },
-    /// A tilt or a shift of the beam does not make sense.
+    /// A tilt or a shift of the beam is out of range.
     #[error("{name} is {found} {unit}, expected -{most} to {most}")]
     Positioning {
         /// Field of [`Positioning`](crate::Positioning).
         name: &'static str,
         /// Its value.
         found: f64,
-        /// Largest amount.
+        /// Largest absolute value.
         most: f64,
         /// Unit of both.
         unit: &'static str,
@@ -78,7 +78,7 @@ pub enum PlaceError {
     },
 }
 
-/// Whether points are a limb at all.
+/// Checks that points can form a limb.
 pub(crate) fn check_points(points: &[Point3<f32>]) -> Result<(), PlaceError> {
     if points.len() < 3 {
         return Err(PlaceError::TooFewPoints {

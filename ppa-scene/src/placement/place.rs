@@ -22,7 +22,7 @@ use crate::room::plane::Plane;
 /// The default is the paper's: a rigid limb that rests on two places, its joint on the central beam.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlaceSettings {
-    /// How far it sinks in.
+    /// Indentation of the soft tissue.
     pub soft_tissue: SoftTissue,
     /// Errors of positioning.
     pub positioning: Positioning,
@@ -41,13 +41,13 @@ pub struct Placement {
     /// Tips the limb about the room's X axis through the joint centre until it rests on two
     /// places, or beyond by the tilt of [`Positioning`], and moves it onto the table and away from the beam by its shift.
     pub t_opt: Rigid<Room, Room>,
-    /// How soft tissue gives way; `None` for a rigid skin.
+    /// Flattening of the soft tissue; `None` for a rigid skin.
     pub flattening: Option<Flattening>,
-    /// How it rests.
+    /// How the limb rests on the table.
     pub contact: Contact,
 }
 
-/// How a placed limb rests on the table plane; measured on the placed points, flattened ones if soft tissue gives way.
+/// How a placed limb rests on the table plane; measured on the placed points, flattened ones if soft tissue deforms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Air between the table and the lowest point, mm.
@@ -58,21 +58,21 @@ pub struct Contact {
     pub distal_mm: f64,
     /// Height of the lowest proximal point, mm.
     pub proximal_mm: f64,
-    /// Distance of both contacts, before the tilt of [`Positioning`], mm. Next to nothing when the limb rests on its middle: its ends
-    /// then hang in the air.
+    /// Distance between the contacts, before the tilt of [`Positioning`], mm. Nearly 0 if the limb rests on its middle and its ends
+    /// hang in the air.
     pub apart_mm: f64,
     /// Where distal ends and proximal begins, from the joint along the table before the limb is
     /// tipped, mm.
     pub split_mm: f64,
     /// Tilt of T_opt, that of [`Positioning`] included, radians; + lifts the proximal end.
     pub tilt_rad: f64,
-    /// How often the closest points were looked for.
+    /// Number of searches for the closest points.
     pub iterations: u32,
 }
 
-/// T_rot: turns the limb about its axis, the front of the limb towards the body's midline.
+/// T_rot: rotates the limb about its axis, the front of the limb towards the body's midline.
 ///
-/// The front (+y of the patient frame) of a right limb turns towards −x, the patient's left; that
+/// The front (+y of the patient frame) of a right limb rotates towards −x, the patient's left; that
 /// of a left limb towards +x.
 pub fn medial_rotation(side: Side, angle_rad: f64) -> Rigid<Patient, Patient> {
     let about_z = match side {
@@ -103,13 +103,13 @@ pub fn place(
     place_with(points_ct, landmarks, angle_rad, table, device, &settings)
 }
 
-/// [`place`] with soft tissue that gives way where the limb rests, and errors of positioning.
+/// [`place`] with soft tissue that deforms where the limb rests, and errors of positioning.
 ///
-/// Both parts sink in; [`Placement::in_room`] is the skin as it then lies. A tilted limb rests on one of them. The central beam
-/// meets the table where it does without a shift; the limb is what moves.
+/// Both parts sink in; [`Placement::in_room`] gives the flattened skin. A tilted limb rests on one of them. The central beam
+/// meets the table at the same point as without a shift; the limb moves instead.
 ///
 /// # Errors
-/// As [`place`], and for depths, a tilt or a shift that make no sense.
+/// The same as [`place`], and for depths, a tilt or a shift out of range.
 pub fn place_with(
     points_ct: &[Point3<f32>],
     landmarks: &Landmarks,
@@ -211,7 +211,7 @@ pub fn place_with(
 }
 
 impl Placement {
-    /// A limb, given by the vertices of its skin in the `ct` frame, as it lies in the room.
+    /// Points of a limb in the room, from the vertices of its skin in the `ct` frame.
     pub fn in_room(&self, points_ct: &[Point3<f32>], landmarks: &Landmarks) -> Vec<Point3<f32>> {
         let room_from_ct = self.room_from_patient * landmarks.patient_from_ct();
         let lies = |p: &Point3<f32>| {
@@ -237,7 +237,7 @@ pub fn ct_from_device(
         * device.room_from_device
 }
 
-/// Heights of the skin above the table, as it lies.
+/// Lowest heights of the distal and the proximal part of the placed skin above the table.
 fn measure(
     points_ct: &[Point3<f32>],
     room_from_ct: Rigid<Room, Ct>,
@@ -246,7 +246,7 @@ fn measure(
     is_distal: impl Fn(&Point3<f32>) -> bool,
 ) -> [f64; 2] {
     let (mut distal_mm, mut proximal_mm) = (f64::INFINITY, f64::INFINITY);
-    // The table as the scan sees it: one product per point.
+    // The table in the frame of the scan: one product per point.
     let table_ct = table.transformed(room_from_ct.inverse().isometry());
     let height = |p: Point3<f64>| match flattening {
         None => table_ct.signed_distance(&p),

@@ -17,7 +17,7 @@ const MOST_SHIFT_MM: f64 = 300.0;
 #[serde(default, deny_unknown_fields)]
 pub struct Positioning {
     /// Tilt from the pose in which the limb rests on two places, about the axis across the table through the joint, degrees: above 0 the
-    /// proximal end is lifted, below 0 the distal end. What holds that end up is not modelled.
+    /// proximal end is lifted, below 0 the distal end. The support of that end is not modelled.
     pub tilt_deg: f64,
     /// Offset of the central beam from the joint, mm: across the table, towards the left of a supine patient, and along it, towards the
     /// head; x and y of the built-in room. It is the same for right and left limbs.
@@ -25,7 +25,7 @@ pub struct Positioning {
 }
 
 impl Positioning {
-    /// Whether values are in range.
+    /// Checks that the values are in range.
     ///
     /// # Errors
     /// [`PlaceError::Positioning`] for a tilt beyond ±45 degrees or a shift beyond ±300 mm.

@@ -1,4 +1,4 @@
-//! Soft tissue that gives way where a limb rests on the table.
+//! Soft tissue that deforms where a limb rests on the table.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ impl SoftTissue {
         [self.distal_mm, self.proximal_mm]
     }
 
-    /// Whether the depths make sense.
+    /// Checks that the depths are in range.
     ///
     /// # Errors
     /// [`PlaceError::SoftTissue`] for a depth that is not 0 to 20 mm.
@@ -41,14 +41,14 @@ impl SoftTissue {
     }
 }
 
-/// Share of its height that the lowest tissue keeps: the contact becomes 1 / 0.4³, some 16 times,
+/// Share of its height that the lowest tissue keeps: the contact becomes 1 / 0.4³, about 16 times,
 /// flatter.
 const KEPT: f64 = 0.4;
 
 /// Contacts of a tilted limb that lie closer to each other along the table are one, mm.
 const ONE_PLACE_MM: f64 = 10.0;
 
-/// What soft tissue does to a limb that was laid into the table by some depth s.
+/// Deformation of the soft tissue of a limb that was placed a depth s into the table.
 ///
 /// A layer of thickness T = 2 s / (1 − a), a = 0.4, is pressed into its upper T − s. With
 /// u = (z + s) / T from 0 at the lowest point to 1 at the top of the layer, heights become
@@ -56,8 +56,8 @@ const ONE_PLACE_MM: f64 = 10.0;
 /// ζ′ = a + (1 − a) u; lengths across the table become (x − x₀) / ζ′ about the line x₀ through
 /// both contacts. The tissue swells sideways by as much as it is pressed: the Jacobian is
 /// ζ′ · 1/ζ′ = 1, so that no volume is lost, and no two points meet. Above the layer nothing moves.
-/// s runs linearly along the table from one contact to the other and beyond, but not below 0. Where a limb is tilted, a part that is
-/// lifted does not sink in, s keeps its values at the contacts beyond them, and what lies deeper than s is moved onto the table.
+/// s is linear along the table from one contact to the other and beyond, but not below 0. If a limb is tilted, a part that is
+/// lifted does not sink in, s keeps its values at the contacts beyond them, and points deeper than s are moved onto the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flattening {
@@ -66,17 +66,17 @@ pub struct Flattening {
     room_from_contact: Isometry3<f64>,
     /// Depth of the distal contact, mm.
     depth_mm: f64,
-    /// How much deeper it gets per mm towards the head.
+    /// Increase of the depth per mm towards the head.
     depth_per_mm: f64,
-    /// How much the line through both contacts moves across the table per mm towards the head.
+    /// Shift of the line through both contacts across the table per mm towards the head.
     across_per_mm: f64,
-    /// Distance of both contacts along the table for a tilted limb, mm.
+    /// Distance between the contacts along the table for a tilted limb, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     apart_mm: Option<f64>,
 }
 
 impl Flattening {
-    /// The flattening of a limb whose lowest distal and proximal points are these.
+    /// The flattening of a limb with these lowest distal and proximal points.
     pub(crate) fn at(
         [distal, proximal]: [Point3<f64>; 2],
         table: &Plane,
@@ -92,7 +92,7 @@ impl Flattening {
         let apart = room_from_contact.inverse_transform_point(&proximal);
         if is_tilted {
             let depths = depths.map(|depth| depth.max(0.0));
-            // Lowest points next to each other: all of the limb sinks in alike.
+            // Lowest points next to each other: the entire limb sinks in equally.
             let is_one_place = apart.y < ONE_PLACE_MM;
             let rise = |over: f64| if is_one_place { 0.0 } else { over / apart.y };
             return Self {
@@ -116,7 +116,7 @@ impl Flattening {
         }
     }
 
-    /// Where a point of the placed limb comes to lie, room frame.
+    /// Position of a point of the placed limb after flattening, room frame.
     pub fn flattened(&self, p: &Point3<f64>) -> Point3<f64> {
         let mut at = self.room_from_contact.inverse_transform_point(p);
         let along = self.apart_mm.map_or(at.y, |apart| at.y.clamp(0.0, apart));

@@ -1,4 +1,4 @@
-//! Where the x-ray source and the detector are.
+//! Position of the x-ray source and the detector.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,10 @@
-//! Why there is no room.
+//! Errors of x-ray rooms.
 
-/// Why there is no room.
+/// Reason why there is no room.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RoomError {
-    /// A length of the built-in room does not make sense.
+    /// A length of the built-in room is out of range.
     #[error("{name} of the room is {found} mm, expected {expected}")]
     Length {
         /// Field of [`RoomSpec`](crate::RoomSpec).
@@ -14,7 +14,7 @@ pub enum RoomError {
         /// What it should be.
         expected: &'static str,
     },
-    /// A file cannot be read, or holds no points.
+    /// A file cannot be read, or has no points.
     #[error(transparent)]
     Ply(#[from] ppa_mesh::MeshFileError),
 }

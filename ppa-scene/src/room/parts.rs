@@ -161,7 +161,7 @@ impl Patch {
         }
     }
 
-    /// For each row of constant u, how many points it holds.
+    /// Number of points in each row of constant u.
     fn rows(&self, spacing_mm: f64) -> Vec<usize> {
         let count = |length: f64| ((length / spacing_mm).round() as usize).max(1);
         match self {

@@ -38,7 +38,7 @@ impl Lattice {
     }
 }
 
-/// Cells of a plane that hang together, and the points in and above them.
+/// Connected cells of a plane, and the points in and above them.
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
     plane: Plane,
@@ -64,7 +64,7 @@ pub(crate) struct Sheet {
 impl Patch {
     /// The connected patches of at least the smallest area, largest first.
     ///
-    /// A cell counts as filled when it holds at least a tenth of the points of a typical cell,
+    /// A cell counts as filled if it contains at least a tenth of the points of a typical cell,
     /// and no fewer than three, so that stray points neither bridge gaps nor look like a surface.
     pub(crate) fn of_plane(
         points: &[Point3<f64>],
@@ -119,7 +119,7 @@ impl Patch {
             }
         }
         patches.sort_by_key(|patch| std::cmp::Reverse(patch.cells.len()));
-        // Points are handed out in one pass, for there may be as many patches as cells.
+        // Points are assigned in one pass, since there may be as many patches as cells.
         let numbered = patches.iter().enumerate();
         let patch_of: BTreeMap<Cell, usize> = numbered
             .flat_map(|(number, patch)| patch.cells.iter().map(move |cell| (*cell, number)))
@@ -136,7 +136,7 @@ impl Patch {
 
     /// The total-least-squares plane of the patch's points, fitted until they stay the same.
     ///
-    /// `None` when the points do not gather on a plane: evenly spread points put twice as many
+    /// `None` if the points do not concentrate on a plane: evenly spread points put twice as many
     /// between one and three thresholds as within one.
     pub(crate) fn refined(self, settings: &PlaneSettings) -> Option<Sheet> {
         let members = &self.members;
@@ -153,8 +153,8 @@ impl Patch {
             }
             let (fitted, centre, rms_mm) = total_least_squares(members, &near, &plane)?;
             plane = fitted;
-            // Three standard deviations keep a Gaussian sheet whole; what a wall or a cushion
-            // adds evenly over the threshold is cut off.
+            // Three standard deviations keep a Gaussian sheet complete; points that a wall or a cushion
+            // adds evenly over the threshold are cut off.
             reach_mm = settings
                 .threshold_mm
                 .min(3.0 * robust_sigma(members, &near, &plane).max(0.01));
@@ -227,7 +227,7 @@ fn total_least_squares(
 }
 
 impl Sheet {
-    /// Whether a point of the plane lies on the patch or in a cell next to it: marks and the
+    /// Whether a point of the plane is on the patch or in a cell next to it: marks and the
     /// patient leave holes in a recorded table.
     pub(crate) fn covers(&self, p: &Point3<f64>) -> bool {
         let (i, j) = self.lattice.cell(p);

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// The points p with `normal · p = offset_mm`; the normal points to the side where things lie.
+/// The points p with `normal · p = offset_mm`; the normal points to the side of the objects.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     /// Unit normal.
@@ -31,7 +31,7 @@ impl Plane {
         point - self.normal.into_inner() * self.signed_distance(point)
     }
 
-    /// The plane in the frame that `target_from_source` leads to.
+    /// The plane in the target frame of `target_from_source`.
     pub fn transformed(&self, target_from_source: &Isometry3<f64>) -> Self {
         let point = Point3::from(self.normal.into_inner() * self.offset_mm);
         Self::through(

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::room::device::XrayDevice;
 
-/// What counts as a table top.
+/// Criteria for a table top.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlaneSettings {
@@ -56,7 +56,7 @@ impl PlaneSettings {
         }
     }
 
-    /// Refuses numbers that make no sense.
+    /// Checks that the numbers are in range.
     pub(crate) fn check(&self) -> Result<(), PlaneError> {
         let positive = [
             ("threshold_mm", self.threshold_mm),
@@ -106,7 +106,7 @@ impl PlaneSettings {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaneError {
-    /// A setting does not make sense.
+    /// A setting is out of range.
     #[error("{name} is {found}, expected {expected}")]
     Setting {
         /// Field of [`PlaneSettings`].
@@ -127,21 +127,21 @@ pub enum PlaneError {
     /// The points span no plane.
     #[error("all {found} points in the region lie on one line, expected a surface")]
     OneLine {
-        /// Points looked at.
+        /// Number of points searched.
         found: usize,
     },
-    /// Nothing flat, level, large and in the right place.
+    /// No patch is flat, level, large enough and in the right place.
     #[error(
         "no plane found: none of the {points} points lie in a connected flat patch of {min_area_mm2} mm² \
          or more, within {max_tilt_deg} degrees of level{}",
         if *beam { ", under the central beam" } else { "" }
     )]
     NoPlane {
-        /// Points looked at.
+        /// Number of points searched.
         points: usize,
-        /// Smallest area that was asked for.
+        /// Requested smallest area.
         min_area_mm2: f64,
-        /// Largest tilt that was asked for.
+        /// Requested largest tilt.
         max_tilt_deg: f64,
         /// Whether the patch had to be under the beam.
         beam: bool,

@@ -62,7 +62,7 @@ impl Default for RoomSpec {
     }
 }
 
-/// Half the width of the tube housing and of what hangs on it, mm.
+/// Half the width of the tube housing and of the parts attached to it, mm.
 const HOUSING_RADIUS_MM: f64 = 90.0;
 /// Depth of the tube column, mm.
 const COLUMN_MM: f64 = 200.0;
@@ -212,7 +212,7 @@ impl RoomSpec {
             [-half_detector, -half_detector, detector_top - 20.0],
             [half_detector, half_detector, detector_top],
         );
-        // The pedestal stands beside the detector's travel, towards the head end.
+        // The pedestal stands next to the detector's travel, towards the head end.
         let pedestal_y = 0.5 * (half_detector + head_end);
         cuboid(
             [-0.5 * half_table, pedestal_y - 0.5 * PEDESTAL_MM, floor],

@@ -18,16 +18,16 @@ pub struct TablePlane {
     /// Points of the patch within the threshold.
     pub inliers: usize,
     /// Root mean square distance from the plane, mm, of the points it was fitted to: the inliers within three standard
-    /// deviations, without what a wall or a cushion adds.
+    /// deviations, without points of a wall or a cushion.
     pub rms_mm: f64,
     /// Mean of the points it was fitted to, on the plane.
     pub centre: Point3<f64>,
 }
 
-/// How many points a search scores; more would not sharpen the choice, least squares does that.
+/// Number of points scored per search; more would not improve the choice, since least squares refines it.
 const SCORED_POINTS: usize = 8_000;
 
-/// How many planes are taken out of a cloud, largest first, before the search gives up.
+/// Number of planes removed from a cloud, largest first, before the search stops.
 const MAX_PLANES: usize = 10;
 
 const MIN_POINTS: usize = 30;
@@ -97,7 +97,7 @@ pub fn table_plane(
     })
 }
 
-/// Settings that make sense.
+/// Checked settings.
 struct Search<'a> {
     settings: &'a PlaneSettings,
     up: Unit<Vector3<f64>>,
@@ -134,7 +134,7 @@ impl<'a> Search<'a> {
             })
     }
 
-    /// The level plane with the most points within the threshold, among many through three.
+    /// The level plane with the most points within the threshold, among many planes through three points.
     fn consensus(&self, points: &[Point3<f64>], seed: u64, round: u64) -> Option<Plane> {
         let near_beam = self.beam.map(|(from, along)| {
             let reach = 2.0 * self.settings.min_area_mm2.sqrt();

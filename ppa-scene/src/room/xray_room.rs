@@ -8,7 +8,7 @@ use crate::room::device::XrayDevice;
 use crate::room::error::RoomError;
 use crate::room::spec::RoomSpec;
 
-/// Most points of a room's cloud, 24 bytes each.
+/// Largest number of points in a room's cloud, 24 bytes each.
 const MOST_POINTS: f64 = 2e7;
 
 /// An x-ray room with its device.
@@ -18,7 +18,7 @@ pub struct XrayRoom {
     pub cloud: PointCloud,
     /// The same surfaces as triangles, when they are known.
     pub mesh: Option<Mesh>,
-    /// Where the x-rays come from.
+    /// The x-ray device.
     pub device: XrayDevice,
 }
 

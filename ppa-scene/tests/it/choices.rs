@@ -1,4 +1,4 @@
-//! One choice at a time: everything else is found again to fit it.
+//! One choice at a time: everything else is found to fit it.
 
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{
@@ -172,7 +172,7 @@ fn a_given_axis_passes_nearest_to_a_given_joint() {
     assert_eq!(open.limb, Some(LimbKind::LowerLeg));
 }
 
-/// The axis that is shown as a choice is the one that was found.
+/// The axis shown as a choice is the one that was found.
 #[test]
 fn the_axis_found_is_the_axis_when_it_is_chosen() {
     let found = P01.find(Side::Right, &automatic()).unwrap();

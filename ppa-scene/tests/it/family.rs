@@ -1,4 +1,4 @@
-//! Landmarks of the seventeen phantoms, however they lie in the scan.
+//! Landmarks of the seventeen phantoms in any orientation in the scan.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use ppa_ct::Volume;
@@ -16,7 +16,7 @@ struct Subject {
     name: String,
     side: Side,
     truth: Truth,
-    /// Middle of the joint space on the axis: the groove of the trochlea lies below the cone that
+    /// Middle of the joint space on the axis: the groove of the trochlea is below the cone that
     /// [`Truth::joint_centre`] belongs to.
     joint: Point3<f64>,
     volume: Volume,
@@ -62,7 +62,7 @@ impl Subject {
         }
     }
 
-    /// The leg turned in the world while the scanner's slices stay level.
+    /// The leg rotated in the world while the scanner's slices stay level.
     fn turned(&self, turn: &Rotation3<f64>) -> Scan {
         Scan::under_the_scanner(&self.volume, self.skin.iter(), turn)
     }
@@ -146,7 +146,7 @@ fn twenty_degrees(axis: usize, sign: f64) -> Rotation3<f64> {
     Rotation3::from_scaled_axis(Vector3::ith(axis, sign * 20_f64.to_radians()))
 }
 
-/// A left leg with its toes down by 12 degrees that leans backwards, and lies across the table.
+/// A left leg with its toes down by 12 degrees, inclined backwards and lying across the table.
 #[test]
 fn a_leaning_leg_is_measured_across_its_shaft() {
     let subject = Subject::numbered(13);
@@ -155,7 +155,7 @@ fn a_leaning_leg_is_measured_across_its_shaft() {
     check(&subject, &twenty_degrees(1, -1.0));
 }
 
-/// Feet from 2 degrees up to 12 degrees down, as they lie and turned about one of the axes: left and right legs either way about each.
+/// Feet from 2 degrees up to 12 degrees down, as they lie and rotated about one of the axes: left and right legs either way about each.
 #[test]
 #[ignore = "a minute"]
 fn seventeen_legs_turned_about_an_axis_each() {

@@ -20,7 +20,7 @@ fn points() -> impl Strategy<Value = Point3<f64>> {
 }
 
 proptest! {
-    /// A chain does what its links do one after the other, and its inverse undoes it.
+    /// A chain equals its links applied one after the other, and its inverse undoes it.
     #[test]
     fn chains_compose_and_invert(a in isometries(), b in isometries(), p in points()) {
         let room_from_patient = Rigid::<Room, Patient>::new(a);
@@ -31,7 +31,7 @@ proptest! {
         prop_assert!((room_from_ct.inverse() * (room_from_ct * p) - p).norm() < 1e-8);
     }
 
-    /// A limb keeps its shape in whatever frame it is looked at.
+    /// A limb keeps its shape in any frame.
     #[test]
     fn motions_keep_distances(a in isometries(), p in points(), q in points()) {
         let rigid = Rigid::<Room, Ct>::new(a);
@@ -59,7 +59,7 @@ proptest! {
     }
 }
 
-/// Five decimals are read, and what they lack is not kept: distances stay.
+/// Matrices with five decimals are read without their rounding errors: distances stay.
 #[test]
 fn printed_matrices_are_read_as_the_nearest_motion() {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.8, 1.1));

@@ -1,4 +1,4 @@
-//! Landmarks of the phantom knee, however it lies in the scan, and what is not a knee.
+//! Landmarks of the phantom knee in any orientation in the scan, and limbs that are not a knee.
 
 use std::sync::LazyLock;
 
@@ -14,7 +14,7 @@ use crate::scan::{P01, Scan};
 
 const SPACING_MM: f64 = 1.5;
 
-/// The phantom knee, and what its exact shape says.
+/// The phantom knee, and landmarks from its exact shape.
 struct Knee {
     side: Side,
     volume: Volume,
@@ -23,7 +23,7 @@ struct Knee {
     joint: Point3<f64>,
     /// Middle of the plateau from front to back, in the middle of the joint space.
     plateau: Point3<f64>,
-    /// Square to the line behind the condyles.
+    /// Perpendicular to the posterior condylar line.
     anterior: Vector3<f64>,
     /// Through the middle of the joint space where the condyles reach lowest, towards the patient's right.
     joint_line: Vector3<f64>,
@@ -41,7 +41,7 @@ impl Knee {
         let steps = |from: f64, to: f64, step: f64| {
             (0..=((to - from) / step).round() as usize).map(move |i| from + step * i as f64)
         };
-        // Of the patient's right and left condyle: the middle of the joint space, and the hindmost point.
+        // Of the patient's right and left condyle: the middle of the joint space, and the most posterior point.
         let [right, left] = [-1.0, 1.0].map(|sign: f64| {
             let columns = steps(15.0, 30.0, 1.0)
                 .flat_map(|x| steps(-5.0, 20.0, 1.0).map(move |y| [sign * x, y]));
@@ -159,7 +159,7 @@ fn a_left_knee_is_found_however_it_lies() {
     }
 }
 
-/// Blurred, noisy and in slices of 3 mm, as the real ones.
+/// Blurred, noisy and in slices of 3 mm, like real scans.
 #[test]
 fn a_knee_is_found_in_thick_noisy_slices() {
     let scanner = Scanner {
@@ -180,7 +180,7 @@ fn a_knee_is_found_in_thick_noisy_slices() {
     RIGHT.compare("thick", &landmarks, &Rotation3::identity());
 }
 
-/// Choices that repeat what was found, as a case with all choices filled in holds them.
+/// Choices that repeat the found values, as in a case with all choices filled in.
 fn recorded(found: &Landmarks) -> LandmarkOverrides {
     LandmarkOverrides {
         axis: None,
@@ -189,7 +189,7 @@ fn recorded(found: &Landmarks) -> LandmarkOverrides {
     }
 }
 
-/// Found again from the record, the patient frame is the same.
+/// Landmarks found from the recorded choices give the same patient frame.
 #[test]
 fn recorded_choices_reproduce_a_knee() {
     let scan = Scan::under_the_scanner(&LEFT.volume, LEFT.skin.iter(), &about(0, 20.0));
@@ -272,7 +272,7 @@ fn an_ankle_is_refused_where_a_knee_was_asked_for() {
     assert!((Point3::from(at_mm) - joint).norm() < 6.0, "{at_mm:?}");
 }
 
-/// Upside down, what follows a tibia to its flare arrives at the knee: that is not an ankle, however short the calf is.
+/// Upside down, the search along the tibia ends at the knee: that is not an ankle, however short the calf is.
 #[test]
 fn an_upside_down_knee_is_no_ankle() {
     let over = about(1, 180.0);
@@ -328,7 +328,7 @@ fn leg() -> Scan {
     Scan::of(Volume::new(grid, hu).unwrap())
 }
 
-/// Of a whole leg the ankle is taken, and the knee on request; both are recorded.
+/// For a whole leg the ankle is used, or the knee on request; both are recorded.
 #[test]
 fn a_whole_leg_shows_both_joints() {
     let leg = leg();
@@ -358,7 +358,7 @@ fn a_whole_leg_shows_both_joints() {
     assert_eq!(knee.joints, landmarks.joints);
 }
 
-/// Without a calf the femur gives the axis, with little of both the line through both; with less nothing does.
+/// Without a calf, the femur gives the axis; with little of both, the line through both; with less, there is none.
 #[test]
 fn the_axis_follows_what_is_seen_of_the_shafts() {
     let whole = Scan::of(RIGHT.volume.clone());
@@ -373,7 +373,7 @@ fn the_axis_follows_what_is_seen_of_the_shafts() {
     };
     let thigh = whole.slices(slice(-40.0)..slice(140.0));
     let thigh = thigh.find(Side::Right, &automatic()).unwrap();
-    // The phantom's femur leans by 3 degrees.
+    // The phantom's femur is inclined by 3 degrees.
     assert!(
         lean(&thigh) < 4.0 && notes(&thigh, KneeAxis::Femur),
         "{thigh:?}"

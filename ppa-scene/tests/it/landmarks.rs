@@ -40,7 +40,7 @@ fn ankle_and_axis_of_the_phantom_are_found() {
     assert!(aside < 5.0, "axis passes the joint at {aside:.2} mm");
 }
 
-/// The syndesmosis of this one is thinner than a voxel: tibia and fibula are one outline up to 65 mm above the joint.
+/// The syndesmosis of this leg is thinner than a voxel: tibia and fibula are one outline up to 65 mm above the joint.
 #[test]
 fn the_ankle_is_found_where_coarse_voxels_fuse_the_bones() {
     let leg = LowerLeg::from_seed(5, ppa_phantom::Side::Right);
@@ -51,7 +51,7 @@ fn the_ankle_is_found_where_coarse_voxels_fuse_the_bones() {
     assert!(off.norm() < 4.0, "joint off by {off:?}");
 }
 
-/// Turning the whole scan by 20 degrees about any axis turns the landmarks with it.
+/// Rotating the whole scan by 20 degrees about any axis rotates the landmarks with it.
 #[test]
 fn landmarks_turn_with_the_scan_and_the_limb_still_rests() {
     let truth = LowerLeg::p01().truth();
@@ -107,7 +107,7 @@ fn the_plane_lies_under_the_limb() {
     );
 }
 
-/// What is recorded gives the same patient frame when it is found again from the record.
+/// Landmarks found from the recorded choices give the same patient frame.
 #[test]
 fn recorded_choices_reproduce_the_landmarks() {
     let found = P01.find(Side::Right, &automatic()).unwrap();
@@ -157,7 +157,7 @@ fn a_person_overrules_every_choice() {
     assert!(got.anterior[0] > 0.2 && found.anterior[0].abs() < 0.05);
 }
 
-/// Without a joint the reference level is the middle of the limb, if a person says that it shall be.
+/// Without a joint the reference level is the middle of the limb, on request.
 #[test]
 fn a_calf_alone_is_another_limb_on_request() {
     let [.., nk] = P01.volume.grid().size();
@@ -201,7 +201,7 @@ fn a_calf_alone_is_another_limb_on_request() {
     assert_eq!(given.joint_centre, landmarks.joint_centre);
 }
 
-/// Bumps have skin to sit on: every site holds vertices, and medial is towards the other leg.
+/// Every bump site contains vertices, and medial is towards the other leg.
 #[test]
 fn bump_sites_reach_the_skin() {
     let landmarks = P01.find(Side::Right, &automatic()).unwrap();

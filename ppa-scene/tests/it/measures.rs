@@ -1,4 +1,4 @@
-//! What is measured about a limb with its landmarks.
+//! Measures of a limb and its landmarks.
 
 use nalgebra::{Rotation3, Vector3};
 use ppa_phantom::{LowerLeg, TableTop};
@@ -52,7 +52,7 @@ fn a_phantom_measures_what_it_was_drawn_with() {
     ));
 }
 
-/// However the leg is rotated in the scanner, and whatever side it is said to be of.
+/// For any rotation of the leg in the scanner, and any given side.
 #[test]
 fn the_fibula_tells_the_side_at_every_rotation() {
     for side in [Side::Right, Side::Left] {
@@ -67,7 +67,7 @@ fn the_fibula_tells_the_side_at_every_rotation() {
     }
 }
 
-/// An axis that is moved by the choice of its regions' centres is inclined to the shaft by what its direction differs.
+/// An axis moved by the choice of its regions' centres is inclined to the shaft by the change of its direction.
 #[test]
 fn an_axis_through_the_skin_is_inclined_to_the_shaft() {
     let choices = LandmarkOverrides {

@@ -71,7 +71,7 @@ fn left_and_right_are_mirror_images() {
     }
 }
 
-/// T_opt turns about the room's X axis only, both ends rest, nothing sinks, and the joint stays
+/// T_opt rotates about the room's X axis only, both ends rest, nothing sinks, and the joint stays
 /// on the central beam.
 #[test]
 fn limb_rests_on_both_ends_at_every_angle() {
@@ -165,7 +165,7 @@ fn a_limb_without_foot_is_split_in_the_middle() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Where the scan's origin is and how it is turned makes no difference in the room.
+    /// Origin and rotation of the scan make no difference in the room.
     #[test]
     fn placement_does_not_depend_on_the_scan_frame(motion in isometries(), angle in 0.0..1.6_f64) {
         let (points, landmarks) = (boot(Side::Right), boot_landmarks(Side::Right));
@@ -180,8 +180,8 @@ proptest! {
         prop_assert!((here.room_from_patient * p - there.room_from_patient * p).norm() < 0.1);
     }
 
-    /// Wherever Π_P lies, T_mat brings it onto the table and T_opt the limb to rest. T_mat is
-    /// close to half a turn here, where matrices are hard to turn into quaternions.
+    /// Wherever Π_P is, T_mat brings it onto the table and T_opt the limb to rest. T_mat is
+    /// close to half a turn here, where converting matrices to quaternions is hard.
     #[test]
     fn any_plane_under_the_limb_will_do(slopes in prop::array::uniform2(-0.6..0.6_f64), angle in 0.0..1.6_f64) {
         let mut landmarks = boot_landmarks(Side::Right);

@@ -1,4 +1,4 @@
-//! Errors of positioning: a tilted limb, a beam beside the joint.
+//! Errors of positioning: a tilted limb, a beam off the joint.
 
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{
@@ -34,7 +34,7 @@ fn rigid(tilt_deg: f64, beam_shift_mm: [f64; 2]) -> PlaceSettings {
 }
 
 proptest! {
-    /// The joint lies as far from the beam as asked, the limb is tipped by the tilt that was asked for about the axis across the
+    /// The joint is at the requested distance from the beam, the limb is tipped by the requested tilt about the axis across the
     /// table, and its lowest point touches the table.
     #[test]
     fn a_limb_is_tilted_and_shifted_as_asked(

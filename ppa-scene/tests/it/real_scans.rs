@@ -1,4 +1,4 @@
-//! Real limbs. They lie beside the repository, or where `PPA_SHARED` says.
+//! Real limbs, stored next to the repository or in the folder `PPA_SHARED`.
 
 use std::path::PathBuf;
 
@@ -54,7 +54,7 @@ fn rests_at_every_angle(limb: &Limb, landmarks: &Landmarks) {
 
 /// Read off the slices by eye: the gap lies in the slice at 201 mm, with the plafond's plate one
 /// slice (3.27 mm) above and the talar dome's below; its middle is at (−45, 12) within 4 mm. The
-/// mass beside the joint must not pull the axis off it.
+/// mass next to the joint must not pull the axis off it.
 #[test]
 #[ignore = "needs ../shared/data/lower-leg-ankle-sts049"]
 fn ankle_of_a_swollen_leg() {
@@ -78,7 +78,7 @@ fn front_turned(degrees: f64) -> Vector3<f64> {
 /// Read off axial, coronal and sagittal slices by eye. The gap lies 0.7 slices (of 3.27 mm) below slice 50 under the medial
 /// and 0.3 slices below it under the lateral condyle, z = 561 to 562.5 mm; the plateau reaches from x = 38 to 104 mm and from
 /// y = −75 to −40 mm. Behind the condyles a line runs 10 degrees from the scan's x axis, the medial one farther back. The
-/// kneecap is cut by the front face, the calf leans by 22 degrees.
+/// kneecap is cut by the front face, the calf is inclined by 22 degrees.
 #[test]
 #[ignore = "needs ../shared/data/knee-calf-sts028"]
 fn knee_above_a_calf() {
@@ -105,7 +105,7 @@ fn knee_above_a_calf() {
 
 /// As above. The medial condyle and a quarter of the plateau are cut by the side face. The gap lies at slice 5.4 under the medial, 6.8 under
 /// the lateral condyle, z = 596 to 601 mm; the notch between them is centred at x = 91 mm, the plateau reaches from
-/// y = 20 to 66 mm. Too little of the tibia is seen for an axis.
+/// y = 20 to 66 mm. Too little of the tibia is visible for an axis.
 #[test]
 #[ignore = "needs ../shared/data/knee-sts042"]
 fn knee_below_a_thigh() {
@@ -128,7 +128,7 @@ fn knee_below_a_thigh() {
     rests_at_every_angle(&limb, &landmarks);
 }
 
-/// A request for one joint where the scan shows the other is refused, with what was found, where, and what to do.
+/// A request for one joint is refused if the scan shows the other; the error names the joint found, its place, and a remedy.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn the_other_joint_is_refused_with_its_place() {

@@ -1,4 +1,4 @@
-//! The noisy room that other programs were measured on.
+//! The noisy room on which other programs were measured.
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::PointCloud;

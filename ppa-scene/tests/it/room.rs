@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{PlaneSettings, RoomError, RoomSpec, XrayRoom, table_plane};
 
-/// Table top at z = 0, detector 60 mm below, source 1040 mm above: what the spec says.
+/// Table top at z = 0, detector 60 mm below, source 1040 mm above, as in the spec.
 #[test]
 fn built_in_room_has_its_table_under_the_beam() {
     let room = XrayRoom::parametric(&RoomSpec::default()).unwrap();
@@ -21,8 +21,8 @@ fn built_in_room_has_its_table_under_the_beam() {
     assert!((detector - Point3::new(0.0, 0.0, -60.0)).norm() < 1e-9);
 }
 
-/// Every closed part has its outside outside: the divergence theorem gives the parts' volume,
-/// once floor and walls (open sheets through known planes) are taken off.
+/// Every closed part has outward normals: the divergence theorem gives the parts' volume,
+/// once floor and walls (open sheets through known planes) are excluded.
 #[test]
 fn built_in_room_has_outward_normals_and_no_flat_triangle() {
     let spec = RoomSpec::default();

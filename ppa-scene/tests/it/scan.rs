@@ -30,7 +30,7 @@ impl Scan {
         find_landmarks(&self.volume, &self.skin, &self.mask, side, overrides)
     }
 
-    /// A limb turned in the world while the scanner's slices stay level; `points` lie on its skin.
+    /// A limb rotated in the world while the scanner's slices stay level; `points` are on its skin.
     pub fn under_the_scanner<'a>(
         volume: &Volume,
         points: impl Iterator<Item = &'a Point3<f64>>,
@@ -55,7 +55,7 @@ impl Scan {
         Self::of(Volume::new(grid(level), sampled.hu().to_vec()).unwrap())
     }
 
-    /// The same voxels in a turned world.
+    /// The same voxels in a rotated world.
     pub fn turned(&self, turn: &Rotation3<f64>) -> Self {
         let grid = self.volume.grid();
         let affine = turn.to_homogeneous() * grid.ct_from_voxel().matrix();

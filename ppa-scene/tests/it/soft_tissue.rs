@@ -1,4 +1,4 @@
-//! Soft tissue that gives way under the phantom's heel and calf.
+//! Deformation of soft tissue under the phantom's heel and calf.
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{Border, Mesh, iso_surface};
@@ -51,7 +51,7 @@ fn volume_mm3(vertices: &[Point3<f32>], triangles: &[[u32; 3]]) -> f64 {
         .sum()
 }
 
-/// Both parts sink by what was asked for, the skin ends on the table and not below it, a wider
+/// Both parts sink by the requested depths, the skin ends on the table and not below it, a wider
 /// patch of it touches, and the tissue keeps its volume.
 #[test]
 fn heel_and_calf_become_flat_and_keep_their_volume() {

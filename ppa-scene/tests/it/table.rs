@@ -34,7 +34,7 @@ fn wall_through_the_plane_does_not_tilt_it() {
     }
 }
 
-/// Ten thousand tiles apart from each other, each a patch of its own: looking through all points for each
+/// Ten thousand separate tiles, each a patch of its own: searching all points for each
 /// would take minutes.
 #[test]
 fn many_small_patches_are_no_trouble() {

@@ -6,7 +6,7 @@ use ppa_core::Side;
 use super::sections::{LimbSection, LimbSections};
 use crate::landmarks::found::Landmarks;
 
-/// The thinner bone beside the shaft of the thicker one.
+/// The thinner bone next to the shaft of the thicker one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fibula {
     /// Mean direction from the thicker to the thinner bone across the axis: towards the patient's right
@@ -21,7 +21,7 @@ pub struct Fibula {
     pub centre_mm: [f64; 3],
 }
 
-/// The limb must not lie this near to one line with both bones, as sine.
+/// Smallest sine at which the middle of the limb does not count as collinear with both bones.
 const LEAST_SINE: f64 = 0.2;
 
 /// Areas of fibula and tibia are in this ratio; those of a forearm's bones are alike.
@@ -40,7 +40,7 @@ struct Pair {
 }
 
 impl Fibula {
-    /// The side of a leg with such bones; `None` where the limb lies in one line with both.
+    /// The side of a leg with such bones; `None` if the middle of the limb is collinear with both.
     ///
     /// The tibia lies in front of the middle of the leg, under the skin, and the fibula lateral of
     /// it: the turn from one direction to the other gives the side however the leg is rotated.

@@ -31,7 +31,7 @@ pub struct LimbMeasures {
     pub neighbour: Option<Neighbour>,
     /// The shaft of the largest bone; `None` where too little of one is seen.
     pub shaft: Option<Shaft>,
-    /// The thinner of two bones beside each other; `None` where there is no such pair.
+    /// The thinner of two adjacent bones; `None` if there is no such pair.
     pub fibula: Option<Fibula>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::sections::{LimbSection, LimbSections, MIN_TIBIA_MM2};
 
-/// What of another limb may hang on this one, along the shaft of its largest bone.
+/// Possible traces of another limb attached to this one, along the shaft of its largest bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbour {
     /// Largest change of the cross-section from one place to another 3 mm along the limb, percent per mm.

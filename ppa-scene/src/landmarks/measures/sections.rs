@@ -20,7 +20,7 @@ pub(super) struct LimbSection {
     pub above_mm: f64,
     pub area_mm2: f64,
     pub centre: Point3<f64>,
-    /// Bones, largest first; empty outside the regions, and where they were not looked for.
+    /// Bones, largest first; empty outside the regions, and where they were not searched for.
     pub bones: Vec<BoneSection>,
 }
 

@@ -17,7 +17,7 @@ pub struct Support {
     pub span_mm: f64,
     /// How far the plane would pitch if one contact lay half a voxel's side higher, degrees.
     pub pitch_error_deg: f64,
-    /// Unit normal of the plane, to the limb, `ct` frame.
+    /// Unit normal of the plane, towards the limb, `ct` frame.
     pub normal: [f64; 3],
 }
 
