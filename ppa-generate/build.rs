@@ -1,15 +1,15 @@
-//! Hashes what the bytes of a dataset follow from besides plan and scans: the sources and the
-//! physics data of the crates that make it, and the machine that they are compiled for.
+//! Hashes what determines the bytes of a dataset apart from plan and scans: the sources and the physics data of the crates that make it,
+//! and the machine that they are compiled for.
 //!
-//! In a checkout these are files beside this crate. A published crate cannot see its neighbours; their versions, which stand
-//! in for their contents, and in any case those of third-party crates are added by `src/compiled.rs`.
+//! In a checkout these are files next to this crate. A published crate cannot see the other crates of the workspace; `src/compiled.rs` adds
+//! their versions instead, and always adds those of third-party crates.
 
 use std::path::PathBuf;
 use std::{env, io};
 
 use ppa_core::source_hash;
 
-/// Crates that decide the bytes of an image, as folders beside this one.
+/// Crates that determine the bytes of an image, as folders next to this one.
 const CRATES: [&str; 8] = [
     "ppa-core",
     "ppa-ct",
@@ -21,7 +21,7 @@ const CRATES: [&str; 8] = [
     "ppa-xray",
 ];
 
-/// What of a crate decides them.
+/// Parts of a crate that are hashed.
 const PARTS: [&str; 3] = ["Cargo.toml", "data", "src"];
 
 fn main() -> io::Result<()> {
@@ -42,7 +42,7 @@ fn main() -> io::Result<()> {
     Ok(())
 }
 
-/// The target and its instructions, which `-C target-cpu` adds to.
+/// The target and its CPU features, which `-C target-cpu` adds to.
 fn machine() -> String {
     println!("cargo::rerun-if-env-changed=CARGO_ENCODED_RUSTFLAGS");
     let target = ["TARGET", "CARGO_CFG_TARGET_FEATURE"].map(env::var);

@@ -1,11 +1,11 @@
-//! Shards as job arrays: chunks that fit into the cluster's limit, and lists of indices.
+//! Job arrays of shards: chunks within the cluster's limit, and lists of indices.
 
 /// Shards of one job array. Task `index` of the array makes shard `offset + index`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArrayChunk {
-    /// What is added to an index.
+    /// Number added to an index.
     pub offset: u64,
-    /// Indices from 1 on, in ascending order.
+    /// Indices in ascending order, counted from 1.
     pub indices: Vec<u64>,
 }
 
@@ -29,7 +29,7 @@ pub fn split(shards: &[u64], max_array_size: u64) -> Vec<ArrayChunk> {
     chunks
 }
 
-/// Ascending numbers as Slurm writes them: `1-3,7,9-12`.
+/// Formats ascending numbers as Slurm does: `1-3,7,9-12`.
 pub fn index_list(indices: &[u64]) -> String {
     let mut runs: Vec<(u64, u64)> = Vec::new();
     for &index in indices {

@@ -1,20 +1,20 @@
-//! How many shards a plan is divided into, from the time of a pose.
+//! Division of a plan into shards, from the time of a pose.
 
 use serde::{Deserialize, Serialize};
 
 use crate::time_limit::TimeLimit;
 
-/// The time that a task is to take, seconds. Shards of equal size then take from half of it on: 20 to 40 minutes.
+/// Longest intended time of a task, seconds. Shards of equal size then take 20 to 40 minutes.
 const TARGET_S: f64 = 40.0 * 60.0;
 
-/// How much longer than estimated a task may take before it meets its time limit.
+/// Factor by which a task may exceed its estimated time before it reaches its time limit.
 pub(crate) const RESERVE: f64 = 1.5;
 
 /// Slack of the warning before the time limit, for the start of the program and slow disks, seconds. Slurm may warn up to a
 /// minute earlier than asked.
 const SIGNAL_S: f64 = 60.0;
 
-/// More than it takes to stop a pose that resumes and to save what was made of it, seconds.
+/// Upper bound of the time to stop a resumable pose and save its progress, seconds.
 const SAVE_S: f64 = 60.0;
 
 /// Processor time of the work, seconds.
@@ -24,7 +24,7 @@ pub struct PoseCost {
     pub pose_cpu_s: f64,
     /// Processor time to read and shape a limb before its first pose, seconds.
     pub limb_cpu_s: f64,
-    /// Whether a stopped pose resumes where it was stopped, as one of the analog engine does.
+    /// Whether a stopped pose resumes where it stopped, as with the analog engine.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub resumes: bool,
 }
@@ -46,7 +46,7 @@ pub struct Bundle {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BundleError {
-    /// There is nothing to make.
+    /// The plan has no poses.
     #[error("the plan has no poses")]
     NoPoses,
     /// Invalid processor time.
@@ -55,7 +55,7 @@ pub enum BundleError {
         /// Seconds.
         found: f64,
     },
-    /// Not one pose fits into a task.
+    /// The time limit is too short for a single pose.
     #[error(
         "the time limit {limit} is too short: one pose takes about {pose_s:.0} s with the preparation of its limb, and a \
          task stops {warning_s} s before its limit; give at least --time {least}"
@@ -67,16 +67,16 @@ pub enum BundleError {
         pose_s: f64,
         /// Interval between TERM and the time limit, seconds.
         warning_s: u64,
-        /// The shortest limit that takes one pose.
+        /// The shortest limit that fits one pose.
         least: TimeLimit,
     },
 }
 
-/// Divides `poses` into shards that take 20 to 40 minutes each on `cpus` processors, or two thirds of the time limit where
-/// that is less. A plan that takes less is one shard.
+/// Divides `poses` into shards that take 20 to 40 minutes each on `cpus` processors, or two thirds of the time limit if that is less. A
+/// shorter plan is one shard.
 ///
 /// # Errors
-/// [`BundleError`], above all for a time limit that is too short for one pose.
+/// [`BundleError`], for example if the time limit is too short for one pose.
 pub fn bundle(
     poses: u64,
     cost: PoseCost,
@@ -103,7 +103,7 @@ pub fn bundle(
             least: TimeLimit::from_seconds((least / 60.0).ceil() as u64 * 60),
         });
     }
-    // Poses are made side by side, one on each processor; a limb is prepared before the first of them.
+    // Poses run in parallel, one per processor; a limb is prepared before the first of them.
     let pose_s = (cost.pose_cpu_s / f64::from(cpus.max(1))).max(1e-3);
     let target_s = TARGET_S.min(usable_s / RESERVE);
     let most = ((target_s - cost.limb_cpu_s) / pose_s).floor().max(1.0) as u64;
@@ -122,7 +122,7 @@ fn warning_s(cost: PoseCost) -> u64 {
     (SIGNAL_S + 2.0 * (least_pose_s(cost) + cost.limb_cpu_s)).ceil() as u64
 }
 
-/// Processor time of a pose that is not interrupted, seconds.
+/// Uninterruptible processor time of a pose, seconds.
 fn least_pose_s(cost: PoseCost) -> f64 {
     match cost.resumes {
         true => cost.pose_cpu_s.min(SAVE_S),

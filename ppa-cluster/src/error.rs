@@ -1,4 +1,4 @@
-//! Why a folder or Slurm cannot be used.
+//! Errors of job folders and of Slurm.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FolderError {
-    /// The system refused a file or folder.
+    /// A file system operation failed.
     #[error("cannot {action} {}", path.display())]
     File {
         /// `read`, `write`, `create` …
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// The folder above is missing.
+    /// The parent folder is missing.
     #[error("{} cannot be created: {} does not exist or is not a folder", path.display(), parent.display())]
     NoParent {
         /// The folder of jobs.
@@ -25,13 +25,13 @@ pub enum FolderError {
         /// The missing folder.
         parent: PathBuf,
     },
-    /// It holds something else.
+    /// The folder holds something else.
     #[error("{} is neither empty nor a folder of an earlier ppa submit; choose another folder", .0.display())]
     Occupied(PathBuf),
-    /// No jobs were submitted from here.
+    /// No jobs were submitted from the folder.
     #[error("{} contains no slurm/submission.json: nothing was submitted from it", .0.display())]
     NotSubmitted(PathBuf),
-    /// The list of what was submitted is damaged or of another version.
+    /// `submission.json` is damaged or of another version.
     #[error("{} is damaged or was written by another version of ppa: {found}", path.display())]
     Submission {
         /// The file.
@@ -39,7 +39,7 @@ pub enum FolderError {
         /// What is wrong with it.
         found: String,
     },
-    /// Another `ppa submit` works on the folder.
+    /// Another `ppa submit` is using the folder.
     #[error("{} is in use by another ppa submit; wait until it ends", .0.display())]
     Busy(PathBuf),
     /// The path cannot be used in a job script.
@@ -48,7 +48,7 @@ pub enum FolderError {
 }
 
 impl FolderError {
-    /// Adds action and path to an error of the system, for `map_err`.
+    /// Adds action and path to a system error, for `map_err`.
     pub(crate) fn at<'a>(
         action: &'static str,
         path: &'a Path,
@@ -79,7 +79,7 @@ pub enum SlurmError {
     Run {
         /// `sbatch`, `squeue` …
         program: &'static str,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
     /// A program of Slurm failed.
@@ -90,23 +90,23 @@ pub enum SlurmError {
         /// The message of Slurm, in one line.
         said: String,
     },
-    /// An answer of Slurm that is not in the expected form.
+    /// The output of Slurm does not have the expected form.
     #[error("{program} answered \"{found}\", expected {expected}")]
     Answer {
         /// `sbatch`, `squeue` …
         program: &'static str,
-        /// The line at fault.
+        /// The offending line.
         found: String,
         /// The expected form.
         expected: &'static str,
     },
-    /// The configuration does not state the size of arrays.
+    /// The configuration of Slurm does not state MaxArraySize.
     #[error("scontrol show config does not report MaxArraySize as a whole number: found {found}")]
     NoArraySize {
-        /// Its value, or that the line is missing.
+        /// Value found, or a note that the line is missing.
         found: String,
     },
-    /// The cluster takes no arrays.
+    /// The cluster accepts no job arrays.
     #[error("the cluster accepts no job arrays: its MaxArraySize is {found}, expected 2 or more")]
     NoArrays {
         /// MaxArraySize.

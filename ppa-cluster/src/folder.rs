@@ -9,22 +9,22 @@ use sha2::{Digest, Sha256};
 use crate::error::FolderError;
 use crate::submission::{PoseWork, Work};
 
-/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs; `shards/` and `dataset/`, `runs/` with
-/// trainings and tables, or `parts/` with tallies.
+/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs; `shards/` and `dataset/`, `runs/` with training runs and
+/// tables, or `parts/` with tallies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClusterFolder {
     root: PathBuf,
 }
 
-/// Held while a command submits jobs from a folder; released when dropped or when the process dies.
+/// Lock held while a command submits jobs from a folder; released on drop or when the process dies.
 #[derive(Debug)]
 pub struct FolderLock(#[expect(dead_code, reason = "holds the lock")] fs::File);
 
 impl ClusterFolder {
-    /// Creates the folder, or opens one that is empty or that `ppa submit` began. The folder above must exist.
+    /// Creates the folder, or opens an empty one or one started by `ppa submit`. The parent folder must exist.
     ///
     /// # Errors
-    /// [`FolderError`] for a folder that is missing above, cannot be written, or holds something else.
+    /// [`FolderError`] if the parent folder is missing, or if the folder cannot be written or holds something else.
     pub fn create(root: &Path) -> Result<Self, FolderError> {
         let parent = match root.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -102,12 +102,12 @@ impl ClusterFolder {
         }
     }
 
-    /// Its absolute path.
+    /// Absolute path of the folder.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Plan, scripts, logs and the list of what was submitted.
+    /// Folder of plan, scripts, logs and `submission.json`.
     pub fn slurm(&self) -> PathBuf {
         self.root.join("slurm")
     }
@@ -117,7 +117,7 @@ impl ClusterFolder {
         self.slurm().join("plan.toml")
     }
 
-    /// The script of the array, which makes a shard, a training or a part.
+    /// The script of the array, which makes a shard, a training run or a part.
     pub fn task_script(&self, work: &Work) -> PathBuf {
         self.slurm().join(format!("{}.sh", work.task_name()))
     }
@@ -127,12 +127,12 @@ impl ClusterFolder {
         self.slurm().join(format!("{}.sh", work.last_name()))
     }
 
-    /// Settings and division of what was submitted.
+    /// File with the settings and task division of the submission.
     pub fn submission(&self) -> PathBuf {
         self.slurm().join("submission.json")
     }
 
-    /// Logs of all jobs.
+    /// Folder of all job logs.
     pub fn logs(&self) -> PathBuf {
         self.slurm().join("logs")
     }
@@ -158,25 +158,25 @@ impl ClusterFolder {
         self.root.join(format!("dataset{}", work.ending()))
     }
 
-    /// Trainings and tables of experiments.
+    /// Folder of the training runs and tables of experiments.
     pub fn runs(&self) -> PathBuf {
         self.root.join("runs")
     }
 
-    /// Whether a training is finished, by its folder as seen from [`ClusterFolder::runs`].
+    /// Whether a training run is finished, given its folder relative to [`ClusterFolder::runs`].
     pub fn is_trained(&self, training: &str) -> bool {
         self.runs().join(training).join(FINISHED).is_file()
     }
 
-    /// Whether a training was begun.
+    /// Whether a training run was started.
     pub fn is_begun(&self, training: &str) -> bool {
         self.runs().join(training).is_dir()
     }
 
-    /// Whether the last job has done its work: the merged dataset is verified, or tables or images are written.
+    /// Whether the last job has finished: the merged dataset is verified, or tables or images are written.
     ///
     /// # Errors
-    /// [`FolderError::File`] when the system cannot tell.
+    /// [`FolderError::File`] if the file cannot be queried.
     pub fn is_done(&self) -> Result<bool, FolderError> {
         let path = self.root.join(DONE);
         match path.metadata() {
@@ -186,7 +186,7 @@ impl ClusterFolder {
         }
     }
 
-    /// The name of all its jobs, which no other folder has.
+    /// Name shared by all jobs of the folder and unique to it.
     pub fn job_name(&self) -> String {
         let hash = Sha256::digest(self.root.as_os_str().as_encoded_bytes());
         let digits: String = hash[..6].iter().map(|byte| format!("{byte:02x}")).collect();
@@ -194,17 +194,16 @@ impl ClusterFolder {
     }
 }
 
-/// The last job writes this file, as seen from the folder, when it has done its work: verified a dataset, or written
-/// tables or images.
+/// File, relative to the folder, that the last job writes after it has verified a dataset or written tables or images.
 pub(crate) const DONE: &str = "slurm/verified";
 
-/// The folder of the parts, as seen from the folder.
+/// The folder of the parts, relative to the job folder.
 pub(crate) const PARTS: &str = "parts";
 
-/// The tally of a part of a radiograph, as seen from the folder of the part.
+/// The tally of a part of a radiograph, relative to the folder of the part.
 pub(crate) const TALLY: &str = "radiograph.tally";
 
-/// The file that shows that a training is finished; `ppa experiment` writes it last.
+/// File that marks a finished training run; `ppa experiment` writes it last.
 pub(crate) const FINISHED: &str = "finished.json";
 
 #[cfg(test)]

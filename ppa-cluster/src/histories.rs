@@ -1,4 +1,4 @@
-//! A command that follows histories, divided into parts.
+//! Division of a command's histories into parts.
 
 use std::path::PathBuf;
 
@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 use crate::bundle::RESERVE;
 use crate::time_limit::TimeLimit;
 
-/// The time that a task is to take, seconds.
+/// Intended time of a task, seconds.
 const TARGET_S: f64 = 30.0 * 60.0;
 
-/// Interval between TERM and the time limit of a task, seconds: histories end within a second, but a tally of many voxels takes
-/// its time to be written, and Slurm may warn up to a minute earlier than asked.
+/// Interval between TERM and the time limit of a task, seconds: histories end within a second, but writing a tally of many voxels takes
+/// longer, and Slurm may warn up to a minute earlier than asked.
 pub(crate) const WARNING_S: u64 = 180;
 
 /// The command whose histories are divided.
@@ -24,34 +24,34 @@ pub enum HistoryCommand {
     Mcgpu,
 }
 
-/// A command that follows histories, one part a task.
+/// A command that follows histories, one part per task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HistoryWork {
     /// The command.
     #[serde(flatten)]
     pub divided: DividedCommand,
-    /// Parts of the histories of each projection, one a task.
+    /// Parts of the histories of each projection, one per task.
     pub parts: u64,
-    /// Processor time as it was measured; absent where the user gave the number of tasks.
+    /// Measured processor time; absent if the user gave the number of tasks.
     pub cost: Option<HistoryCost>,
 }
 
 /// A command line whose histories are divided.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DividedCommand {
-    /// Which command it is.
+    /// The command.
     pub command: HistoryCommand,
-    /// Its words after `ppa`, without those in `outputs`.
+    /// Arguments after `ppa`, except those in `outputs`.
     pub words: Vec<String>,
-    /// The words that name outputs, for the last job only.
+    /// Arguments that name outputs, for the last job only.
     pub outputs: Vec<String>,
-    /// The folder that its paths start from.
+    /// Folder against which relative paths are resolved.
     pub folder: PathBuf,
     /// Histories of each projection.
     pub histories: u64,
-    /// Projections; 1 of a radiograph.
+    /// Projections; 1 for a radiograph.
     pub projections: u64,
-    /// SHA-256 of the program: tallies of two programs do not fit together.
+    /// SHA-256 of the program: tallies of different programs cannot be merged.
     pub program_sha256: String,
 }
 
@@ -65,9 +65,9 @@ impl DividedCommand {
 /// Processor time of histories, seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HistoryCost {
-    /// Of a million histories.
+    /// Time of a million histories.
     pub million_cpu_s: f64,
-    /// Of reading and preparing what they are followed in, in each task.
+    /// Time to read and prepare the input, in each task.
     pub preparation_cpu_s: f64,
 }
 
@@ -82,7 +82,7 @@ impl HistoryCost {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HistoriesError {
-    /// A task could hardly begin.
+    /// The time limit leaves too little time after the preparation.
     #[error(
         "the time limit {limit} is too short: a task prepares for {preparation_s:.0} s and stops {WARNING_S} s before its limit; give at least --time {least}"
     )]
@@ -91,13 +91,13 @@ pub enum HistoriesError {
         limit: TimeLimit,
         /// Estimated time before the first history, seconds.
         preparation_s: f64,
-        /// The shortest limit within which a task does more than prepare.
+        /// The shortest limit that is accepted.
         least: TimeLimit,
     },
 }
 
-/// Divides `histories`, those of all projections, into parts that take half an hour on `cpus` processors, or two thirds of the
-/// time limit where that is less.
+/// Divides `histories`, the total of all projections, into parts that take half an hour on `cpus` processors, or two thirds of the time
+/// limit if that is less.
 ///
 /// # Errors
 /// [`HistoriesError::TooShort`].
@@ -108,7 +108,7 @@ pub fn divide_histories(
     limit: TimeLimit,
 ) -> Result<u64, HistoriesError> {
     let usable_s = limit.seconds() as f64 - WARNING_S as f64;
-    // As long for the histories as for what comes before them. The preparation may keep one processor.
+    // The histories get at least as much time as the preparation, which may use one processor only.
     let preparation_s = cost.preparation_cpu_s;
     let least_s = (2.0 * preparation_s).max(60.0);
     if usable_s < least_s {

@@ -2,13 +2,13 @@
 
 use crate::error::SlurmError;
 
-/// Slurm's own MaxArraySize where its configuration does not state one.
+/// Slurm's default MaxArraySize.
 pub const DEFAULT_MAX_ARRAY_SIZE: u64 = 1001;
 
-/// MaxArraySize from the output of `scontrol show config`: indices of an array are below it.
+/// Reads MaxArraySize from the output of `scontrol show config`; indices of an array are below it.
 ///
 /// # Errors
-/// [`SlurmError::NoArraySize`] without a number, [`SlurmError::NoArrays`] where the cluster takes no arrays.
+/// [`SlurmError::NoArraySize`] if there is no number, [`SlurmError::NoArrays`] if the cluster accepts no arrays.
 pub fn max_array_size(config: &str) -> Result<u64, SlurmError> {
     let value = config.lines().find_map(|line| {
         let (key, value) = line.split_once('=')?;

@@ -1,4 +1,4 @@
-//! Logs of the tasks, one file for each, to which every attempt appends.
+//! Task logs: one file per task, to which every attempt appends.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -9,10 +9,10 @@ use crate::error::FolderError;
 use crate::submission::Work;
 use crate::usage::core_s;
 
-/// What is read of the end of a log, bytes.
+/// Bytes read from the end of a log.
 const TAIL: u64 = 16 * 1024;
 
-/// The log of one chunk of an array as `sbatch --output` takes it; Slurm puts the index in place of `%a`.
+/// File name of the logs of one array chunk, for `sbatch --output`; Slurm replaces `%a` by the index.
 pub(crate) fn log_pattern(work: &Work, offset: u64) -> String {
     let name = work.task_name();
     match offset {
@@ -21,7 +21,7 @@ pub(crate) fn log_pattern(work: &Work, offset: u64) -> String {
     }
 }
 
-/// The number of the task of a log's name.
+/// The task number in a log's name.
 fn task_of(name: &str) -> Option<u64> {
     let number = name
         .strip_prefix("shard_")
@@ -33,7 +33,7 @@ fn task_of(name: &str) -> Option<u64> {
     offset.checked_add(index)
 }
 
-/// The newest log of every task that was started, by its number. A folder that is missing holds none.
+/// Returns the newest log of every started task, by task number. A missing folder has none.
 ///
 /// # Errors
 /// [`FolderError::File`] when the folder cannot be read.
@@ -60,7 +60,7 @@ pub fn logged_tasks(logs: &Path) -> Result<BTreeMap<u64, PathBuf>, FolderError> 
     Ok(paths.collect())
 }
 
-/// The last line of a log that is neither empty nor the one that each task leaves when it ends; `None` where there is none.
+/// Returns the last line of a log that is neither empty nor the closing line of a task; `None` if there is none.
 pub fn last_line(log: &Path) -> Option<String> {
     let mut file = File::open(log).ok()?;
     let size = file.metadata().ok()?.len();

@@ -7,19 +7,19 @@ use serde::Serialize;
 use crate::bundle::Bundle;
 use crate::time_limit::TimeLimit;
 
-/// Time between two tasks in the same place, seconds: 300 empty tasks took 125 s on four places of Slurm 22.05.
+/// Time between two tasks in the same slot, seconds: 300 empty tasks took 125 s on four slots of Slurm 22.05.
 const BETWEEN_TASKS_S: f64 = 1.7;
 
 /// A share of a cluster for the tasks of a plan, as `nodes=4,cores=32,cpus=4,time=2:00:00`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClusterSize {
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: u32,
-    /// Cores of a node.
+    /// Cores per node.
     pub cores: u32,
-    /// Cores of a task; 1 where they are left out.
+    /// Cores per task; 1 by default.
     pub cpus: u32,
-    /// Time limit of a task; [`TimeLimit::DEFAULT`] where it is left out.
+    /// Time limit of a task; [`TimeLimit::DEFAULT`] by default.
     pub time: TimeLimit,
 }
 
@@ -42,9 +42,9 @@ pub struct Makespan {
     pub task_s: f64,
     /// Tasks that run at the same time.
     pub at_once: u64,
-    /// Hours from the first task to the last, without the wait in the queue and without the merge.
+    /// Hours from the first task to the last, without queue wait and merge.
     pub hours: f64,
-    /// Of these, hours for the slowest of the last tasks, which the others do not need.
+    /// Part of `hours` added by the slowest of the last tasks.
     pub straggler_hours: f64,
     /// Allocated cores times hours.
     pub core_hours: f64,
@@ -104,11 +104,11 @@ impl FromStr for ClusterSize {
     }
 }
 
-/// Estimates the times of a plan that is divided by `bundle`; the times of poses of different limbs have the standard deviation `pose_sd_s`.
+/// Estimates the times of a plan divided as in `bundle`; the times of poses of different limbs have the standard deviation `pose_sd_s`.
 ///
-/// The places of the cluster take the shards in rounds of equal length. The poses of a shard are mostly those of one limb, so the time of a
-/// task deviates by as many times `pose_sd_s` as it has poses. The last of n tasks is late by at most √(2 ln n) of that: the bound of the
-/// expected maximum of n normal numbers.
+/// The slots of the cluster run the shards in rounds of equal length. Most poses of a shard belong to one limb, so the standard deviation
+/// of a task's time is `pose_sd_s` times its poses per core. The last of n tasks is late by at most √(2 ln n) of that: the bound on the
+/// expected maximum of n normal variables.
 pub fn makespan(bundle: &Bundle, pose_sd_s: f64, size: &ClusterSize) -> Makespan {
     let at_once = size.at_once().min(bundle.shards);
     let rounds = bundle.shards.div_ceil(at_once);
@@ -161,7 +161,7 @@ mod tests {
     }
 
     proptest! {
-        /// Each place takes the next task when it is free.
+        /// Each slot takes the next task when it is free.
         #[test]
         fn equal_tasks_take_as_long_as_when_places_are_filled_in_turn(
             shards in 1_u64..400, nodes in 1_u32..6, cores in 1_u32..9, task_s in 1.0..4000.0_f64

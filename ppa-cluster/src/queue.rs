@@ -11,7 +11,7 @@ pub(crate) const FORMAT: &str = "%i|%T|%N|%r|%k";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobKind {
-    /// This shard, counted from 1.
+    /// A shard, counted from 1.
     Shard(u64),
     /// The merged dataset.
     Merge,
@@ -32,32 +32,32 @@ impl JobKind {
 pub struct QueuedJob {
     /// Slurm's identifier, `4711_3` or `4712`.
     pub id: String,
-    /// What it makes.
+    /// What the job makes.
     pub kind: JobKind,
     /// State, such as `PENDING` or `RUNNING`.
     pub state: String,
-    /// Nodes; empty before it starts.
+    /// Nodes; empty before the job starts.
     pub node: String,
-    /// Why it waits, such as `Resources`; empty where Slurm gives no reason.
+    /// Reason for waiting, such as `Resources`; empty if Slurm gives none.
     pub reason: String,
 }
 
 impl QueuedJob {
-    /// Whether it waits to start; all others run, or end just now.
+    /// Whether the job is waiting to start; all others are running or ending.
     pub fn is_pending(&self) -> bool {
         self.state == "PENDING"
     }
 
-    /// Slurm's identifier of the array, or of the job where it is not in an array.
+    /// Slurm's identifier of the array, or of the job if it is not in an array.
     pub fn array_id(&self) -> &str {
         self.id.split('_').next().unwrap_or(&self.id)
     }
 }
 
-/// Reads the output of `squeue --noheader --array --format=%i|%T|%N|%r|%k`. Jobs with comments of others are left out.
+/// Reads the output of `squeue --noheader --array --format=%i|%T|%N|%r|%k`. Jobs with other comments are skipped.
 ///
 /// # Errors
-/// [`SlurmError::Answer`] with the first line that has another form.
+/// [`SlurmError::Answer`] with the first malformed line.
 pub fn parse_queue(text: &str) -> Result<Vec<QueuedJob>, SlurmError> {
     let mut jobs = Vec::new();
     for line in text.lines().filter(|line| !line.trim().is_empty()) {

@@ -1,16 +1,16 @@
-//! Words of shell scripts.
+//! Quoting for shell scripts.
 
 use std::path::Path;
 
 use crate::error::FolderError;
 
-/// The text of a path.
+/// The path as UTF-8 text.
 pub(crate) fn unicode(path: &Path) -> Result<&str, FolderError> {
     path.to_str()
         .ok_or_else(|| FolderError::NotUnicode(path.to_owned()))
 }
 
-/// A text as one word of a POSIX shell: as it is where that is safe, else in single quotes.
+/// Quotes a text as one word of a POSIX shell: unchanged if that is safe, otherwise in single quotes.
 pub fn shell_quoted(text: &str) -> String {
     let is_safe = |c: char| c.is_ascii_alphanumeric() || "_-./:=,@%+".contains(c);
     if !text.is_empty() && text.chars().all(is_safe) {

@@ -1,5 +1,5 @@
-//! Outputs of a divided command: the last job makes them in the folder of the jobs, then puts them in the places that the command names. A job that
-//! was stopped in between can run again, and a file created there since the submission is kept.
+//! Outputs of a divided command: the last job writes them in the job folder, then copies them to the paths that the command names. A job
+//! that was stopped in between can run again, and a file created at such a path since the submission is kept.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -39,11 +39,11 @@ rm -rf "$results"
 
 /// The outputs of a command, for its script.
 pub(crate) struct Results {
-    /// The words that name outputs, in the folder of the jobs.
+    /// Arguments that name outputs, with paths in the job folder.
     pub words: String,
-    /// What comes before the command.
+    /// Shell code before the command.
     pub before: String,
-    /// What puts the outputs in their places.
+    /// Shell code that copies the outputs to their paths.
     pub after: String,
 }
 

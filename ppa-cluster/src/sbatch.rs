@@ -10,7 +10,7 @@ use crate::queue::JobKind;
 use crate::quote::{shell_quoted, unicode};
 use crate::submission::{Submission, Work};
 
-/// One call of `sbatch`; prints as a line of shell.
+/// One call of `sbatch`; displayed as a shell command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SbatchCommand {
     arguments: Vec<String>,
@@ -19,8 +19,8 @@ pub struct SbatchCommand {
 }
 
 impl SbatchCommand {
-    /// The same job after others, whether they succeed or fail; `after` holds their identifiers, which the script gets as its
-    /// last argument, separated by commas.
+    /// Delays the job until others have succeeded or failed; `after` holds their identifiers, which the script gets as its last argument,
+    /// separated by commas.
     #[must_use]
     pub fn after(mut self, after: &[String]) -> Self {
         if !after.is_empty() {
@@ -50,7 +50,7 @@ impl fmt::Display for SbatchCommand {
     }
 }
 
-/// The commands that submit chunks of tasks, one for each; at most `max_tasks` tasks of a chunk run at a time.
+/// Returns the commands that submit chunks of tasks, one per chunk; at most `max_tasks` tasks of a chunk run at a time.
 ///
 /// # Errors
 /// [`FolderError::NotUnicode`].
@@ -98,7 +98,7 @@ fn command(
             "--parsable".to_owned(),
             format!("--chdir={}", unicode(folder.root())?),
             format!("--comment={}", JobKind::comment(offset)),
-            // As seen from the folder, since Slurm puts numbers in place of % in the whole path.
+            // Relative to the folder, since Slurm replaces % patterns in the full path.
             format!("--output=slurm/logs/{log}"),
         ],
         script: Vec::new(),

@@ -1,4 +1,4 @@
-//! What the job scripts of each kind of work run.
+//! Bodies of the job scripts for each kind of work.
 
 use std::fmt::Write;
 
@@ -9,13 +9,13 @@ use crate::quote::{shell_quoted, unicode};
 use crate::results::Results;
 use crate::submission::{PoseWork, TrainingWork};
 
-/// What differs between scripts.
+/// Parts that differ between scripts.
 pub(crate) struct ScriptBody {
     /// What the script does, in a sentence.
     pub title: String,
     /// Shell variables: the number of the task, and Slurm's name of the job.
     pub number: &'static str,
-    /// The work.
+    /// Shell code of the work.
     pub run: String,
 }
 
@@ -84,7 +84,7 @@ pub(crate) fn of_poses(work: &PoseWork, cpus: u32) -> (ScriptBody, ScriptBody) {
     (task, last)
 }
 
-/// The scripts of the trainings of experiments.
+/// The scripts of the training runs of experiments.
 pub(crate) fn of_trainings(work: &TrainingWork, cpus: u32) -> (ScriptBody, ScriptBody) {
     let all = work.trainings().count();
     let mut choice = String::new();
@@ -165,7 +165,7 @@ pub(crate) fn of_histories(
         let mut words = divided.outputs.iter();
         words.any(|word| word == option || word.starts_with(&format!("{option}=")))
     };
-    // Voxels are counted where their dose is asked for; the map of a part alone is not kept.
+    // Voxels are counted if a dose map is requested; the map of a single part is not kept.
     let dose_map = match named("--dose-map") {
         true => [
             "--dose-map \"$part/dose_map.nii\"",
@@ -239,7 +239,7 @@ mod tests {
 
     use super::FIND_MISSING;
 
-    /// What is missing in the end, of one file that appears after a wait, with these states of the tasks.
+    /// What is missing in the end, given task states and one file that appears after a wait.
     fn missing_in_the_end(states: &str) -> String {
         let script = format!(
             "waited=0\n\

@@ -10,10 +10,10 @@ use crate::script_body::{ScriptBody, of_histories, of_poses, of_trainings};
 use crate::submission::{Submission, TaskSettings, Work};
 use crate::usage::ended_line;
 
-/// The ppa that the jobs run.
+/// The `ppa` program that the jobs run.
 #[derive(Debug, Clone, Copy)]
 pub struct Program<'a> {
-    /// Its absolute path.
+    /// Absolute path of the program.
     pub path: &'a Path,
     /// SHA-256 of the file, in hexadecimal; a node whose file differs refuses the work.
     pub sha256: &'a str,
@@ -22,33 +22,33 @@ pub struct Program<'a> {
 /// The scripts of one folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scripts {
-    /// Script of the array: one shard, training or part a task. Its argument is the number to add to the index of a task.
+    /// Script of the array: one shard, training run or part per task. Its argument is added to the index of the task.
     pub task: String,
     /// Script of the job that merges, or writes tables.
     pub last: String,
 }
 
-/// Why no script can be written.
+/// Why a script cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScriptError {
-    /// A setting that would not be one word of an `#SBATCH` line.
+    /// A setting is not a single word of an `#SBATCH` line.
     #[error(
         "--{option} is \"{found}\", expected a name without spaces, quotes or other special characters"
     )]
     Word {
         /// `partition`, `account`, `mem` or `gres`.
         option: &'static str,
-        /// What was given.
+        /// The given value.
         found: String,
     },
-    /// A path that cannot stand in a script.
+    /// A path cannot be used in a script.
     #[error(transparent)]
     Path(#[from] FolderError),
 }
 
 impl Scripts {
-    /// The scripts of a submission.
+    /// Builds the scripts of a submission.
     ///
     /// # Errors
     /// [`ScriptError`] for settings and paths that a script cannot hold.
@@ -85,7 +85,7 @@ impl Scripts {
     }
 }
 
-/// What both scripts begin with: requests to Slurm, folder, program, setup and the check of the plan.
+/// Common head of both scripts: requests to Slurm, folder, program, setup, and the check of plan and program.
 fn head(
     folder: &ClusterFolder,
     submission: &Submission,
@@ -120,7 +120,7 @@ fn head(
     request("nodes=1".to_owned());
     request("ntasks=1".to_owned());
     request(format!("cpus-per-task={cpus}"));
-    // Only to the script, which passes it on.
+    // Sent only to the script, which passes it on.
     request(format!("signal=B:TERM@{}", submission.work.warning_s()));
     request("requeue".to_owned());
     request("open-mode=append".to_owned());
@@ -152,7 +152,7 @@ fn head(
     Ok(text)
 }
 
-/// A value that Slurm reads as one word.
+/// Returns a value if Slurm reads it as one word.
 fn word<'a>(option: &'static str, value: &'a str) -> Result<&'a str, ScriptError> {
     let is_plain = |c: char| c.is_alphanumeric() || "_-.,:+@=".contains(c);
     if value.is_empty() || !value.chars().all(is_plain) {
@@ -164,7 +164,7 @@ fn word<'a>(option: &'static str, value: &'a str) -> Result<&'a str, ScriptError
     Ok(value)
 }
 
-/// Functions of both scripts. A job that its time limit stops again and again, as one that finishes no pose, ends after 20 restarts.
+/// Functions of both scripts. A job that repeatedly reaches its time limit, such as one that finishes no pose, ends after 20 restarts.
 const RUN: &str = r#"
 # Runs a command. TERM, which Slurm sends before the time limit, is passed on once: ppa finishes the poses or the step in progress.
 run() {
@@ -280,7 +280,7 @@ mod tests {
             let said = Command::new("bash").args(["-c", &script]).output().unwrap();
             assert_eq!(String::from_utf8(said.stdout).unwrap(), expected);
         }
-        // The one that they need counts as well.
+        // The training run that they need counts as well.
         let last = &scripts.last;
         assert!(last.contains("<<'END'\np\na\nb\nc\nEND\n"), "{last}");
     }
@@ -316,7 +316,7 @@ mod tests {
             let Scripts { task, last } = of(one);
             [task, last]
         }) {
-            // As far as the program is named, then what was read.
+            // The script up to the name of the program, then the values that it read.
             let head = script.split("module load").next().unwrap();
             let script_file = folder.slurm().join("test.sh");
             fs::write(&script_file, &script).unwrap();

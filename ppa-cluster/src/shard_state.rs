@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use crate::queue::QueuedJob;
 
-/// Where a shard, or the merged dataset, stands.
+/// State of a shard or of the merged dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShardState {
     /// All of its poses are made.
     Done,
-    /// A job makes it, or ends just now.
+    /// A job is making it, or is ending.
     Running,
     /// A job waits for it.
     Queued,
@@ -34,7 +34,7 @@ impl fmt::Display for ShardState {
     }
 }
 
-/// The state of a shard; `job` is its job in the queue, `started` whether it left a log or a folder.
+/// Returns the state of a shard; `job` is its job in the queue, `started` whether it left a log or a folder.
 pub fn shard_state(complete: bool, job: Option<&QueuedJob>, started: bool) -> ShardState {
     match (job, started) {
         _ if complete => ShardState::Done,

@@ -8,7 +8,7 @@ use crate::limits::max_array_size;
 use crate::queue::{FORMAT, QueuedJob, parse_queue};
 use crate::sbatch::SbatchCommand;
 
-/// Slurm, by the programs in PATH.
+/// Slurm, through its programs in PATH.
 #[derive(Debug, Clone, Copy)]
 pub struct Slurm;
 
@@ -16,12 +16,12 @@ impl Slurm {
     /// MaxArraySize of the cluster.
     ///
     /// # Errors
-    /// [`SlurmError`], above all where Slurm is not installed.
+    /// [`SlurmError`], for example if Slurm is not installed.
     pub fn max_array_size(self) -> Result<u64, SlurmError> {
         max_array_size(&output("scontrol", &["show", "config"])?)
     }
 
-    /// All jobs of a name that wait or run.
+    /// Returns all waiting and running jobs of a name.
     ///
     /// # Errors
     /// [`SlurmError`].
@@ -46,7 +46,7 @@ impl Slurm {
         output("sbatch", &arguments).map(|_| ())
     }
 
-    /// Queues a job; its identifier.
+    /// Queues a job and returns its identifier.
     ///
     /// # Errors
     /// [`SlurmError`].
@@ -64,7 +64,7 @@ impl Slurm {
     }
 }
 
-/// The number that `sbatch --parsable` prints, followed by the cluster's name where there are several.
+/// Reads the number that `sbatch --parsable` prints, followed by the cluster's name if there are several.
 fn job_id(said: &str) -> Result<String, SlurmError> {
     let id = said.trim().split(';').next().unwrap_or_default();
     if id.is_empty() || !id.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -92,7 +92,7 @@ fn output(program: &'static str, arguments: &[&str]) -> Result<String, SlurmErro
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// What a program said when it failed, its lines joined.
+/// The output of a failed program, with its lines joined.
 fn in_one_line(stderr: &[u8], stdout: &[u8], status: std::process::ExitStatus) -> String {
     for said in [stderr, stdout] {
         let said = String::from_utf8_lossy(said);

@@ -15,10 +15,10 @@ use crate::error::FolderError;
 use crate::histories::{self, HistoryWork};
 use crate::time_limit::TimeLimit;
 
-/// Format of the file.
+/// Version of the file format.
 const VERSION: u32 = 1;
 
-/// What every job asks Slurm for.
+/// Slurm settings of every job.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSettings {
@@ -41,25 +41,25 @@ pub struct TaskSettings {
     pub setup: Option<String>,
 }
 
-/// Where the time of a pose comes from.
+/// Source of the time of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CostSource {
-    /// One pose was made to measure it.
+    /// Measured on one pose.
     Measured,
-    /// The user stated it.
+    /// Given by the user.
     Given,
 }
 
-/// What the tasks make. Its division stays the same for all later submissions, since tasks that are done follow it.
+/// What the tasks make. Its division stays the same for all later submissions, since finished tasks follow it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Work {
-    /// Shards of a plan, one a task.
+    /// Shards of a plan, one per task.
     Poses(PoseWork),
-    /// Trainings of experiments, one a task.
+    /// Training runs of experiments, one per task.
     Trainings(TrainingWork),
-    /// Parts of the histories of a command, one a task.
+    /// Parts of the histories of a command, one per task.
     Histories(HistoryWork),
 }
 
@@ -84,7 +84,7 @@ pub struct PoseWork {
     pub poses: u64,
     /// Time of a pose and of a limb.
     pub cost: PoseCost,
-    /// Where these times come from.
+    /// Source of these times.
     pub cost_source: CostSource,
     /// The division into shards.
     pub bundle: Bundle,
@@ -93,26 +93,26 @@ pub struct PoseWork {
     pub archive: bool,
 }
 
-/// The trainings of experiments.
+/// The training runs of experiments.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TrainingWork {
     /// The experiments, in the order of the tasks.
     pub experiments: Vec<ExperimentTrainings>,
-    /// Folders of other trainings that these begin with or test.
+    /// Folders of other training runs that these start from or test.
     pub needed: Vec<String>,
 }
 
-/// The trainings of one experiment.
+/// The training runs of one experiment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExperimentTrainings {
-    /// Its name, as `ppa experiment` takes it.
+    /// Name of the experiment, as `ppa experiment` takes it.
     pub experiment: String,
-    /// The folder of each training, as seen from the folder of all trainings. Task k makes number k of them.
+    /// The folder of each training run, relative to the folder of all runs. Task k of the experiment makes number k of them.
     pub trainings: Vec<String>,
 }
 
 impl PoseWork {
-    /// How the names of shards and dataset end.
+    /// File name ending of shards and dataset.
     pub(crate) fn ending(&self) -> &'static str {
         if self.archive { ".tar" } else { "" }
     }
@@ -136,7 +136,7 @@ impl Work {
         }
     }
 
-    /// Tasks, counted from 1.
+    /// Number of tasks, which are counted from 1.
     pub fn tasks(&self) -> u64 {
         match self {
             Self::Poses(work) => work.bundle.shards,
@@ -160,7 +160,7 @@ impl Work {
 const STEP_S: u64 = 180;
 
 impl TrainingWork {
-    /// The folders of the trainings, in the order of the tasks.
+    /// The folders of the training runs, in the order of the tasks.
     pub fn trainings(&self) -> impl Iterator<Item = &str> {
         let all = self.experiments.iter();
         all.flat_map(|one| one.trainings.iter().map(String::as_str))
@@ -171,23 +171,23 @@ impl TrainingWork {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Submission {
     version: u32,
-    /// The plan file that the copy in the folder was made from; of histories, the absolute path of the case or input file.
+    /// The plan file that was copied to the folder; for histories, the absolute path of the case or input file.
     pub plan: PathBuf,
     /// SHA-256 of that copy, or of the case or input file.
     pub plan_sha256: String,
-    /// Poses, trainings or histories.
+    /// Poses, training runs or histories.
     #[serde(flatten)]
     pub work: Work,
-    /// What the jobs ask for.
+    /// Slurm settings of the jobs.
     pub settings: TaskSettings,
-    /// Whether jobs were queued, and not only their scripts written: from then on plan and division stay.
+    /// Whether jobs were queued, not only their scripts written; plan and division are then fixed.
     pub submitted: bool,
-    /// SHA-256 of the scripts as they were written, by file name.
+    /// SHA-256 of the scripts as written, by file name.
     pub scripts: BTreeMap<String, String>,
 }
 
 impl Submission {
-    /// The first submission of a plan, before any job is queued.
+    /// Creates the first submission of a plan, before any job is queued.
     pub fn new(plan: PathBuf, plan_sha256: String, work: Work, settings: TaskSettings) -> Self {
         Self {
             version: VERSION,
@@ -200,7 +200,7 @@ impl Submission {
         }
     }
 
-    /// Reads the file; `None` where nothing was submitted.
+    /// Reads the file; `None` if nothing was submitted.
     ///
     /// # Errors
     /// [`FolderError`] for a file that cannot be read or is not of this form.
@@ -252,7 +252,7 @@ impl Submission {
         whole_file::write(path, (text + "\n").as_bytes()).map_err(FolderError::at("write", path))
     }
 
-    /// Writes a script, unless somebody edited the one that is there: an edited script is kept, and true returned.
+    /// Writes a script unless the existing one was edited by hand; returns true if an edited script was kept.
     ///
     /// # Errors
     /// [`FolderError::File`].
@@ -318,7 +318,7 @@ pub(crate) mod tests {
         Submission::new("plan.toml".into(), "ab".repeat(32), work, settings)
     }
 
-    /// Three trainings of two experiments, on a GPU.
+    /// Three training runs of two experiments, on a GPU.
     pub(crate) fn trainings() -> Submission {
         let experiment = |experiment: &str, trainings: &[&str]| ExperimentTrainings {
             experiment: experiment.to_owned(),

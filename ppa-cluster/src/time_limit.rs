@@ -22,7 +22,7 @@ pub struct TimeLimitError {
 }
 
 impl TimeLimit {
-    /// The limit of tasks where none is given: two hours.
+    /// The default limit of a task: two hours.
     pub const DEFAULT: Self = Self::from_seconds(2 * 3600);
 
     /// A limit of whole seconds.
@@ -30,7 +30,7 @@ impl TimeLimit {
         Self { seconds }
     }
 
-    /// Seconds.
+    /// The limit in seconds.
     pub const fn seconds(self) -> u64 {
         self.seconds
     }
@@ -58,7 +58,7 @@ impl FromStr for TimeLimit {
                 None => (None, text),
             };
             let parts: Vec<u64> = clock.split(':').map(number).collect::<Option<_>>()?;
-            // Without days the first of one or two numbers is minutes, after days it is hours.
+            // The first of one or two numbers is minutes, or hours if days are given.
             let (hours, minutes, seconds) = match (days.is_some(), parts.as_slice()) {
                 (false, [minutes]) => (0, *minutes, 0),
                 (false, [minutes, seconds]) => (0, *minutes, *seconds),

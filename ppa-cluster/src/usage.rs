@@ -1,4 +1,4 @@
-//! Core hours of tasks: those that finished tasks have used, from the line that each leaves in its log, and those of the estimate.
+//! Core hours of tasks: those used by ended tasks, from the line that each leaves in its log, and estimates.
 
 use std::fs;
 use std::io;
@@ -12,9 +12,9 @@ use crate::submission::{Submission, Work};
 /// Core hours of a submission: allocated processors times hours.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CoreHours {
-    /// Of tasks that have ended, by their logs. Tasks that run, and tasks that were killed, are not counted.
+    /// Core hours of ended tasks, from their logs. Running and killed tasks are not counted.
     pub used: f64,
-    /// Of poses or histories, from the time that one was measured to take; of trainings, from those that are finished.
+    /// Estimate from the time of a pose or history, or from finished training runs.
     #[serde(flatten)]
     pub estimate: Option<Estimate>,
 }
@@ -22,17 +22,17 @@ pub struct CoreHours {
 /// Estimated core hours.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Of the whole plan.
+    /// Core hours of the entire plan.
     pub estimated: f64,
-    /// Of what is not made.
+    /// Core hours of the remaining work.
     pub left: f64,
-    /// Hours until it is made if as many tasks run as now; absent while none runs.
+    /// Hours until that is finished with the current number of running tasks; absent if none is running.
     pub left_hours: Option<f64>,
 }
 
 impl CoreHours {
-    /// `made` are the poses, trainings or histories, and the tasks, that are done, `finished` the logs of these tasks, `running` the
-    /// tasks that run now, `logs` the folder of the logs.
+    /// Computes core hours. `made` counts the finished poses, training runs or histories, and the finished tasks; `finished` lists the logs
+    /// of these tasks, `running` counts the running tasks, and `logs` is the folder of the logs.
     ///
     /// # Errors
     /// [`FolderError::File`] when the logs cannot be read.
@@ -81,8 +81,8 @@ impl CoreHours {
 }
 
 impl Estimate {
-    /// From `all` poses or histories and their tasks, those `made`, the `cores` of the tasks that run now, and the processor time of
-    /// poses or histories and tasks, seconds.
+    /// Estimates from the numbers of `all` and of `made` poses or histories and tasks, the `cores` of the running tasks, and `cpu_s`, the
+    /// processor time of poses or histories and tasks in seconds.
     fn of(all: (u64, u64), made: (u64, u64), cores: f64, cpu_s: impl Fn(u64, u64) -> f64) -> Self {
         let left = cpu_s(all.0.saturating_sub(made.0), all.1.saturating_sub(made.1)) / 3600.0;
         Self {
@@ -93,12 +93,12 @@ impl Estimate {
     }
 }
 
-/// What a job script prints when it ends, killed ones excepted; `$task` and `$SECONDS` are variables of the script.
+/// Line that a job script prints when it ends, unless it is killed; `$task` and `$SECONDS` are variables of the script.
 pub(crate) fn ended_line(cpus: u32) -> String {
     format!("job $task ended after $SECONDS s with {cpus} cores")
 }
 
-/// Cores times seconds of a line that a task has left when it ended; `None` for all other lines.
+/// Core seconds in the line that a task prints when it ends; `None` for all other lines.
 pub(crate) fn core_s(line: &str) -> Option<f64> {
     let words: Vec<&str> = line.split(' ').collect();
     let &[
@@ -119,7 +119,7 @@ pub(crate) fn core_s(line: &str) -> Option<f64> {
     Some(seconds as f64 * f64::from(cores))
 }
 
-/// Core seconds of all tasks that have ended.
+/// Core seconds of all ended tasks.
 fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
     let entries = match fs::read_dir(logs) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0.0),
@@ -207,7 +207,7 @@ mod tests {
         assert!((estimate.left - 0.51).abs() < 1e-12);
     }
 
-    /// Of three trainings one is finished; another one was stopped after half an hour.
+    /// One of three training runs is finished; another was stopped after half an hour.
     #[test]
     fn trainings_are_estimated_from_those_that_are_finished() {
         let folder = tempfile::tempdir().unwrap();

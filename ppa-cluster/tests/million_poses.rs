@@ -14,14 +14,14 @@ const MAX_ARRAY_SIZE: u64 = 1001;
 /// A shard in a folder.
 #[derive(Default)]
 struct Shard {
-    /// Poses made, from the first on.
+    /// Number of poses made, starting with the first.
     made: usize,
     begun: bool,
 }
 
 struct Cluster {
     shards: Vec<Shard>,
-    /// How often each pose was made.
+    /// Number of times each pose was made.
     made: Vec<u8>,
     rng: Philox,
     killed: usize,
@@ -80,7 +80,7 @@ impl Cluster {
     }
 }
 
-/// The tasks that `sbatch --array` makes of a list of indices, as `squeue` prints them.
+/// The tasks of `sbatch --array` with a list of indices, as `squeue` prints them.
 fn queued(offset: u64, list: &str) -> Vec<QueuedJob> {
     let mut text = String::new();
     for run in list.split(',') {

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (scan, file) = (folder.join("p01.nii"), folder.join("p01.case.toml"));
     ppa_ct::write(&scan, &LowerLeg::p01().voxelise(2.0, TableTop::Present)?)?;
 
-    // Every decision about the limb, found or chosen, stands in the case.
+    // The case records every decision about the limb, found or chosen.
     let all_found = (Default::default(), Default::default(), Default::default());
     let (case, _) = prepare(&scan, &all_found.0, Side::Right, &all_found.1, &all_found.2)?;
     case.write(&file)?;

@@ -20,18 +20,18 @@ use crate::pose_error::PoseError;
 use crate::pose_id::PoseId;
 use crate::record::PoseJob;
 
-/// Time between two saved states of a tally: at most what a killed run loses of it.
+/// Time between two saves of a tally: the most that a killed run loses of it.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
 
-/// Where a run keeps the tallies of the poses in progress, and what stops it.
+/// Folder of the tallies of poses in progress, and the flag that stops the run.
 pub(crate) struct AnalogHistories<'a> {
     pub folder: PathBuf,
     pub stop: Option<&'a AtomicBool>,
 }
 
 impl AnalogHistories<'_> {
-    /// The radiograph of a pose, which begins with the histories that an earlier run of the same settings and code has followed.
-    /// A damaged tally is replaced.
+    /// Makes the radiograph of a pose, starting from the histories that an earlier run with the same settings and code has followed. A
+    /// damaged tally is replaced.
     ///
     /// # Errors
     /// [`PoseError::Stopped`] once the run is asked to stop; the histories are kept. [`PoseError::Tally`] when they cannot be
@@ -96,9 +96,9 @@ impl AnalogHistories<'_> {
         })
     }
 
-    /// Removes the tallies of all poses, those that are no longer planned included, and the folder if nothing else is in it.
+    /// Removes the tallies of all poses, including those no longer planned, and the folder if it is then empty.
     pub fn remove_all(&self) {
-        // The dataset is complete: what cannot be removed takes space, but does no harm.
+        // The dataset is complete: a file that cannot be removed takes space, but does no harm.
         for name in self.tallies() {
             let _ = fs::remove_file(self.folder.join(name));
         }
@@ -114,7 +114,7 @@ impl AnalogHistories<'_> {
     }
 }
 
-/// How the names of the tallies of a pose begin.
+/// Prefix of the file names of a pose's tallies.
 fn prefix(pose: PoseId) -> String {
     format!("{}_", pose.limb.unit_name(pose.step))
 }

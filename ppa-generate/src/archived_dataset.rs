@@ -23,7 +23,7 @@ pub(crate) struct ArchivedDataset {
 }
 
 impl ArchivedDataset {
-    /// Reads which files an archive holds, written by a run or by another program from a folder.
+    /// Lists the files of an archive, written by a run or by another program from a folder.
     ///
     /// # Errors
     /// [`FolderError`] when it cannot be read or holds something else.
@@ -36,25 +36,24 @@ impl ArchivedDataset {
         Ok(Self { archive, current })
     }
 
-    /// Whether nothing was written to it yet.
+    /// Whether the archive has no files yet.
     pub fn is_empty(&self) -> bool {
         self.current.is_empty()
     }
 
-    /// Whether it has bytes that belong to no member before the last one that counts. What follows that one is what a killed
-    /// run leaves.
+    /// Whether bytes before the end of the last current member belong to no member. Bytes after it are remains of a killed run.
     pub fn is_damaged(&self) -> bool {
         self.archive.damage.is_some_and(|at| at < self.end())
     }
 
-    /// Whether it was written as a whole: it ends as archives do, after the lists of all poses and without other members.
+    /// Whether the archive is complete: it ends as archives do, after the lists of all poses and without other members.
     pub fn is_finished(&self) -> bool {
         let has_damage = self.archive.damage.is_some();
         let is_whole = self.current.len() == self.archive.members.len() && !has_damage;
         is_whole && self.archive.ends_after(self.end()) && self.has(Manifest::FILE)
     }
 
-    /// Whether its files are those of the given names below a folder.
+    /// Whether its files are exactly those of the given names below a folder.
     pub fn holds_exactly(&self, names: &[String], folder: &Path) -> Result<bool, FileError> {
         let is_same = |name: &String| {
             let path = folder.join(name);
@@ -72,7 +71,7 @@ impl ArchivedDataset {
         Ok(true)
     }
 
-    /// Where the next member is to be written: what follows belongs to no finished pose.
+    /// Offset at which the next member is written; later bytes belong to no finished pose.
     pub fn end(&self) -> u64 {
         self.current.values().map(Member::end).max().unwrap_or(0)
     }
@@ -82,12 +81,12 @@ impl ArchivedDataset {
         self.current.contains_key(file)
     }
 
-    /// Bytes of a file; `None` where it has none of this name.
+    /// Size of a file in bytes; `None` if there is none of this name.
     pub fn size(&self, file: &str) -> Option<u64> {
         self.current.get(file).map(|member| member.size)
     }
 
-    /// Reads a file; `None` where it has none of this name.
+    /// Reads a file; `None` if there is none of this name.
     pub fn read(&self, file: &str) -> Result<Option<Vec<u8>>, FileError> {
         let member = self.current.get(file);
         member.map(|member| self.archive.read(member)).transpose()
@@ -134,8 +133,7 @@ fn recorded(file: &str) -> Option<PoseId> {
     PoseId::of_record(name)
 }
 
-/// Of each name the member that counts. An archive that is closed was completed by a run or made by another program, in any
-/// order.
+/// The current member of each name. A closed archive was completed by a run or made by another program, in any order.
 fn current(members: &[Member], is_closed: bool) -> BTreeMap<String, Member> {
     let last_record = members
         .iter()
@@ -163,7 +161,7 @@ fn current(members: &[Member], is_closed: bool) -> BTreeMap<String, Member> {
             }
             add(&mut current, member);
         } else if is_closed || !is_list(&member.name) || last_record.is_none_or(|last| i > last) {
-            // Of a run in progress, lists before a record do not list its pose.
+            // While a run is in progress, lists before a record do not list its pose.
             add(&mut current, member);
         }
     }

@@ -1,7 +1,7 @@
 //! A run whose dataset is an archive: poses are made in a temporary folder and added to the archive one by one.
 //!
-//! The temporary folder lies where the system keeps such folders (`TMPDIR`), on the disk of the node, so that a shared file
-//! system sees one file. A killed run loses the poses in progress; the next run extracts the others and resumes.
+//! The temporary folder is where the system keeps such folders (`TMPDIR`), on the disk of the node, so that a shared file system sees one
+//! file. A killed run loses the poses in progress; the next run extracts the others and resumes.
 
 use std::fs;
 use std::path::Path;
@@ -33,19 +33,19 @@ pub(crate) struct ArchivedRun<'a> {
 /// The archive as the run extends it.
 struct Growing {
     file: fs::File,
-    /// Where the next pose is written.
+    /// Offset at which the next pose is written.
     end: u64,
     /// `dataset.json` and `.ppa/part` as last written to it.
     stated: Vec<NamedBytes>,
 }
 
 impl<'a> ArchivedRun<'a> {
-    /// Locks the archive, which is created where it does not exist, lets `make` complete the dataset in the folder of the run
-    /// and calls [`ArchivedRun::add`] for each pose, and writes the archive of the result. If `make` fails, the archive keeps
-    /// the poses that were added.
+    /// Locks the archive, creating it if it does not exist, lets `make` complete the dataset in the folder of the run and call
+    /// [`ArchivedRun::add`] for each pose, and writes the archive of the result. If `make` fails, the archive keeps the poses that were
+    /// added.
     ///
     /// # Errors
-    /// [`FolderError`] when another process uses the archive or when it holds something else, and what `make` returns.
+    /// [`FolderError`] if another process uses the archive or if it holds something else, and errors of `make`.
     pub fn complete<E: From<JobError>>(
         path: &'a Path,
         make: impl FnOnce(&Self) -> Result<Summary, E>,
@@ -103,13 +103,12 @@ impl<'a> ArchivedRun<'a> {
     fn remove_if_empty(&self) {
         let growing = self.growing.lock().unwrap_or_else(PoisonError::into_inner);
         if growing.file.metadata().is_ok_and(|found| found.len() == 0) {
-            // The error that ended the run counts.
+            // Only the error that ended the run is reported.
             let _ = fs::remove_file(self.path);
         }
     }
 
-    /// Writes the archive of the complete dataset in place of the one that grew. One with damaged members is kept beside it
-    /// as `*.damagedN`.
+    /// Replaces the growing archive by that of the complete dataset. One with damaged members is kept next to it as `*.damagedN`.
     fn finish(&self, summary: &mut Summary) -> Result<(), FolderError> {
         let root = self.scratch.path();
         let names = names(root)?;
@@ -171,14 +170,14 @@ fn named(root: &Path, file: String) -> Result<NamedBytes, FileError> {
     Ok((file, bytes))
 }
 
-/// The files that say which dataset a folder is to hold.
+/// The files that state which dataset a folder is for.
 fn statements(root: &Path) -> Result<Vec<NamedBytes>, FileError> {
     let files = [DESCRIPTION_FILE, PART_FILE].into_iter();
     let files = files.filter(|file| root.join(file).exists());
     files.map(|file| named(root, file.to_owned())).collect()
 }
 
-/// Paths of all files of a dataset, but the lock and what is not in its place yet.
+/// Paths of all files of a dataset, except the lock and staged files.
 fn names(root: &Path) -> Result<Vec<String>, FileError> {
     let mut names = Vec::new();
     let mut folders = vec![root.to_owned()];

@@ -29,7 +29,7 @@ pub struct Case {
     pub source: Source,
     /// How the skin is found and separated from the couch.
     pub surface: LimbSettings,
-    /// Landmark decisions of a person; what is left out is determined again.
+    /// Landmarks chosen by a person; those left out are determined again.
     pub choices: LandmarkOverrides,
     /// Bone label of each voxel, for computed labels.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -39,7 +39,7 @@ pub struct Case {
     pub found: Option<Found>,
 }
 
-/// A case as it stands in a file.
+/// A case as stored in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CaseFile {
@@ -64,7 +64,7 @@ pub struct Source {
     pub path: PathBuf,
     /// SHA-256 over size, affine and Hounsfield units of the volume: the scan's identity.
     pub volume_sha256: String,
-    /// Number of the DICOM series, where the folder holds several.
+    /// Number of the DICOM series, if the folder holds several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub series: Option<i32>,
     /// Whether gaps between slices are interpolated.
@@ -89,7 +89,7 @@ impl Source {
 /// Results of the preparation, recorded for a person to read.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Found {
-    /// Doubts about the scan and the limb.
+    /// Findings about the scan and the limb.
     pub findings: Vec<Finding>,
     /// Axis, joint and plane in the ct frame, mm.
     pub landmarks: Landmarks,
@@ -170,7 +170,7 @@ impl Case {
     /// Writes the case as [`Self::write`] does, but starts from the text of an earlier version and keeps its comments.
     ///
     /// # Errors
-    /// [`CaseError`] as [`Self::write`], and for an earlier version that is no TOML.
+    /// The same as [`Self::write`], and [`CaseError::Parse`] if the earlier version is not TOML.
     pub fn write_edited(&self, earlier: &str, path: &Path) -> Result<(), CaseError> {
         let edited = with_keys(&without_open_choices(earlier), &self.keys(path)?);
         let edited = edited.map_err(|error| CaseError::Parse {
@@ -205,7 +205,7 @@ fn without_open_choices(text: &str) -> String {
     before.chars().chain(kept.flat_map(str::chars)).collect()
 }
 
-/// Adds to `[choices]` the keys that a person may still choose, switched off, with the values that were found.
+/// Adds to `[choices]` the keys that a person may still choose, commented out, with the values that were found.
 fn with_open_choices(mut text: String, case: &Case) -> String {
     const TABLE: &str = "\n[choices]\n";
     let (Some(found), Some(table)) = (&case.found, text.find(TABLE)) else {

@@ -1,4 +1,4 @@
-//! Carries out the decisions of a case again and compares the result with what was found before.
+//! Repeats the preparation of a case and compares the result with the recorded one.
 
 use std::path::Path;
 
@@ -15,34 +15,34 @@ use crate::prepared_limb::{PrepareError, PreparedLimb};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaseCheckError {
-    /// Its file cannot be read.
+    /// The case file cannot be read.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// Its decisions cannot be carried out, or its scan is another one.
+    /// The limb cannot be prepared, or the scan is not that of the case.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
 }
 
-/// How far landmarks lie from those that were found when the case was written.
+/// Change of the landmarks since the case was written.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Drift {
-    /// Distance of the joints, mm.
+    /// Distance between the joint centres, mm.
     pub joint_mm: f64,
     /// Angle between the axes, degrees.
     pub axis_deg: f64,
-    /// Angle between the fronts, degrees.
+    /// Angle between the anterior directions, degrees.
     pub anterior_deg: f64,
     /// Angle between the planes under the limb, degrees.
     pub plane_deg: f64,
-    /// Whether the side or the kind of limb is another one.
+    /// Whether the side or the kind of limb differs.
     pub other_limb: bool,
 }
 
-/// Below these a difference is rounding, mm and degrees.
+/// Smaller differences are rounding errors, mm and degrees.
 const SAME: f64 = 1e-3;
 
 impl Drift {
-    /// From `was` to `is`.
+    /// The change from `was` to `is`.
     pub fn between(was: &Landmarks, is: &Landmarks) -> Self {
         let angle = |a: [f64; 3], b: [f64; 3]| {
             let (a, b) = (Vector3::from(a), Vector3::from(b));
@@ -65,7 +65,7 @@ impl Drift {
         }
     }
 
-    /// Whether nothing has changed but roundings.
+    /// Whether all changes are rounding errors.
     pub fn is_none(&self) -> bool {
         let changes = [
             self.joint_mm,
@@ -77,21 +77,21 @@ impl Drift {
     }
 }
 
-/// A case that was read and carried out again.
+/// A case whose preparation was repeated.
 pub struct CaseCheck {
     /// The case.
     pub case: Case,
     /// Its limb; the scan is the one that the case was made from.
     pub limb: PreparedLimb,
-    /// Change of the landmarks since the case was written; `None` if its `[found]` holds none that this program reads.
+    /// Change of the landmarks since the case was written; `None` if its `[found]` holds no landmarks that this program reads.
     pub drift: Option<Drift>,
 }
 
 impl CaseCheck {
-    /// Reads a case, carries its decisions out again and compares the result with its `[found]`.
+    /// Reads a case, repeats its preparation and compares the result with its `[found]`.
     ///
     /// # Errors
-    /// [`CaseCheckError`] when that cannot be done, also because the scan is another one.
+    /// [`CaseCheckError`] if the case cannot be read or prepared, or its scan is another one.
     pub fn of(path: &Path) -> Result<Self, CaseCheckError> {
         let case = Case::read(path)?;
         let recorded = recorded_landmarks(&read_text(path).map_err(CaseError::File)?);
@@ -100,7 +100,7 @@ impl CaseCheck {
         Ok(Self { case, limb, drift })
     }
 
-    /// Severe findings that the case does not acknowledge: it should not be used before they are.
+    /// Severe findings that the case does not acknowledge; it should not be used until they are.
     pub fn open(&self) -> impl Iterator<Item = &Finding> {
         let acknowledged = &self.case.acknowledged;
         let findings = self.limb.findings.iter();

@@ -1,8 +1,8 @@
-//! Names of files beside a case.
+//! Names of files next to a case.
 
 use std::path::{Path, PathBuf};
 
-/// Where changes of a case are saved until they replace it: `leg.edited.case.toml` of `leg.case.toml`.
+/// Path where changes of a case are saved until they replace it: `leg.edited.case.toml` for `leg.case.toml`.
 pub fn edited_case(original: &Path) -> PathBuf {
     beside_case(original, "edited.case.toml")
 }
@@ -14,7 +14,7 @@ pub fn original_case(edited: &Path) -> Option<PathBuf> {
     Some(edited.with_file_name(format!("{stem}.case.toml")))
 }
 
-/// A file beside a case, named after it: `leg.case.toml` and `plan.toml` give `leg.plan.toml`.
+/// A file next to a case, named after it: `leg.case.toml` and `plan.toml` give `leg.plan.toml`.
 pub fn beside_case(case: &Path, ending: &str) -> PathBuf {
     let name = case.file_name().unwrap_or_default().to_string_lossy();
     let stem = name.strip_suffix(".toml").unwrap_or(&name);

@@ -32,7 +32,7 @@ pub enum Problem {
         /// The pose.
         pose_job: String,
     },
-    /// A run was killed while it put the files of a pose in their place.
+    /// A run was killed while it moved the files of a pose into place.
     #[error(
         "{pose_job} is only partly replaced because the run was interrupted; the next run completes it"
     )]
@@ -40,25 +40,25 @@ pub enum Problem {
         /// The pose.
         pose_job: String,
     },
-    /// A pose follows from other settings than `dataset.json` states.
+    /// A pose was made from settings other than those in `dataset.json`.
     #[error("{pose_job} was made from other settings than those in dataset.json")]
     Stale {
         /// The pose.
         pose_job: String,
     },
-    /// An image is not there.
+    /// An image cannot be read.
     #[error("{file} cannot be read")]
     Unreadable {
         /// Path from the dataset's root.
         file: String,
     },
-    /// An image has other bytes than those that were written.
+    /// The bytes of an image differ from those that were written.
     #[error("{file} is altered: its hash does not match the recorded one")]
     Altered {
         /// Path from the dataset's root.
         file: String,
     },
-    /// A pose has other bytes when it is generated again.
+    /// An image or record differs when its pose is generated again.
     #[error("{file} differs when it is generated again")]
     Differs {
         /// Path from the dataset's root.
@@ -67,12 +67,12 @@ pub enum Problem {
     /// A line of the manifest is not the row of its image.
     #[error("manifest.jsonl line {line} is altered: expected the row of {expected}")]
     ManifestLine {
-        /// Counted from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// The image whose row belongs there, or that none does.
+        /// The image whose row is expected there, or a note that there is none.
         expected: String,
     },
-    /// A list cannot be read, or is not what its records state.
+    /// A list cannot be read or does not match the records.
     #[error("{file} is missing or altered")]
     List {
         /// Path from the dataset's root.
@@ -81,7 +81,7 @@ pub enum Problem {
 }
 
 impl Problem {
-    /// The image or list that is not as it was made: its path from the dataset's root.
+    /// Path of the affected image or list from the dataset's root.
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::Unreadable { file }
@@ -96,20 +96,20 @@ impl Problem {
 /// What [`check`] found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Check {
-    /// Poses that the folder is to hold.
+    /// Poses that the folder should hold.
     pub pose_jobs: usize,
     /// Images whose bytes were compared with their hash.
     pub images: usize,
-    /// Everything that is wrong, in the order of the plan.
+    /// All problems, in the order of the plan.
     pub problems: Vec<Problem>,
 }
 
-/// A dataset that nobody writes to, with the records that can be read.
+/// A dataset locked for reading, with the poses that it should hold.
 pub(crate) struct Recorded {
     _lock: DatasetLock,
     pub planned: Planned,
     pub limbs: Vec<LimbJobs>,
-    /// Where an archive was extracted.
+    /// Folder to which an archive was extracted.
     scratch: Option<tempfile::TempDir>,
     root: PathBuf,
 }
@@ -209,7 +209,7 @@ impl Recorded {
         (Some(record), problems)
     }
 
-    /// The lists against the records, which are in the order of the plan.
+    /// Compares the lists with the records, which are in the order of the plan.
     fn lists(&self, records: Vec<Record>) -> Vec<Problem> {
         let mut records = records.into_iter();
         let record = |_: &PoseJob| records.next().ok_or(());
@@ -250,8 +250,8 @@ impl Recorded {
     }
 }
 
-/// Reads every image of the dataset in the folder or archive `root` and compares it with its hash, and the lists with the records they were made
-/// from. Changes nothing. An archive is extracted to a temporary folder for it.
+/// Reads every image of the dataset in the folder or archive `root` and compares it with its hash, and the lists with the records they were
+/// made from. Changes nothing; an archive is extracted to a temporary folder.
 ///
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset or is being written.

@@ -6,8 +6,7 @@ use ppa_mesh::{CutWalls, Mesh};
 
 /// The skin of a limb, closed by walls where the field of view of its scan cuts it off, so that no camera looks into it.
 ///
-/// `vertices` are those of [`CutWalls::vertices`], wherever they were moved; triangles come from `skin`, the skin of the scan or a
-/// body shape of it.
+/// `vertices` are those of [`CutWalls::vertices`], possibly moved; triangles come from `skin`, the skin of the scan or a body shape of it.
 ///
 /// # Errors
 /// [`BodyError`] for vertices that are not finite or too few.

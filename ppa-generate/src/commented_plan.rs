@@ -10,7 +10,7 @@ use crate::plan_comments::{CALIBRATION, HEADER, KEYS, OFF, OFF_TABLES, TABLES};
 use crate::toml_file::{relative_to, to_toml};
 
 impl Plan {
-    /// A plan with the defaults for cases in files. Cases of one scan are limbs of one patient; patients are numbered from 0.
+    /// Creates a plan with default settings for case files. Cases of one scan are limbs of one patient; patients are numbered from 0.
     ///
     /// # Errors
     /// [`CaseError`] for a case that cannot be read.
@@ -32,7 +32,7 @@ impl Plan {
         Ok(Self::new(cases))
     }
 
-    /// Writes the plan with what every key means and with the settings that are off, whole or not at all. Relative paths are
+    /// Writes the plan with a comment on every key and with optional settings commented out, whole or not at all. Relative paths are
     /// rewritten to start at the plan file's folder.
     ///
     /// # Errors
@@ -41,7 +41,7 @@ impl Plan {
         Ok(write_whole(path, self.commented_text(path)?.as_bytes())?)
     }
 
-    /// What [`Plan::write_commented`] writes into the file `path`.
+    /// The text that [`Plan::write_commented`] writes to the file `path`.
     ///
     /// # Errors
     /// [`PlanError::File`] for a path that is not UTF-8, which TOML cannot hold.
@@ -54,7 +54,7 @@ impl Plan {
         Ok(commented(&to_toml(&plan, path)?))
     }
 
-    /// Settings that are off by default: key, and an example of a value in TOML.
+    /// Settings that are off by default: key and an example value in TOML.
     pub fn optional_settings() -> impl Iterator<Item = (String, &'static str)> {
         let below = |table: &str, line: &'static str| {
             let (key, value) = line.strip_prefix('#')?.split_once(" = ")?;
@@ -118,7 +118,7 @@ fn commented(toml: &str) -> String {
     text + OFF_TABLES
 }
 
-/// Adds the settings of a table that are off; `given` holds those that are not.
+/// Adds the settings of a table that are off; `given` holds those that are on.
 fn off(text: &mut String, table: &str, given: &toml::Table) {
     let mut keys = Some(given);
     for name in table.split('.').filter(|name| !name.is_empty()) {
@@ -204,7 +204,7 @@ mod tests {
         }
     }
 
-    /// Switched on, a setting would stand there twice.
+    /// Otherwise a setting that is switched on would be defined twice.
     #[test]
     fn settings_of_a_technique_are_not_among_those_off() {
         for (_, technique) in Technique::ALL {
@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    /// Serde names the keys that it expects when it meets another one.
+    /// Serde lists the expected keys when it meets an unknown one.
     #[test]
     fn every_key_of_a_plan_stands_in_it() {
         let text = switched_on(&text());

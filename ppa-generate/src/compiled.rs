@@ -7,16 +7,15 @@ use sha2::{Digest, Sha256};
 
 use ppa_dataset::files::hex;
 
-/// Hash of all that the bytes of an image follow from besides plan and scans.
+/// Hash of everything that determines the bytes of an image apart from plan and scans.
 ///
-/// Sources, physics data and target come from `build.rs`. Which versions of other crates were compiled cannot be read there: without
-/// `--locked`, `cargo install` ignores Cargo.lock and passes nothing of it to a build script. But the compiler knows. It
-/// mixes into the identity of a type that of its crate: version, features, profile and compiler, and those of all
-/// crates that it depends on.
+/// Sources, physics data and target come from `build.rs`. The compiled versions of other crates cannot be read there: without `--locked`,
+/// `cargo install` ignores Cargo.lock and passes nothing of it to a build script. But the compiler includes in the identity of a type that
+/// of its crate: version, features, profile and compiler, and those of all its dependencies.
 ///
-/// For a crate in a checkout, Cargo adds its folder, counted from the workspace if it lies inside, so that a package built from the same
-/// files in another folder would seem to be another program. Such crates are known by their sources; only crates from a registry, which have
-/// no folder, are asked for the identity of a type.
+/// For a crate in a checkout, Cargo adds its folder, relative to the workspace if it is inside, so that a package built from the same files
+/// in another folder would seem to be another program. Such crates are identified by their sources; type identities are used only for
+/// registry crates, which have no folder.
 pub(crate) fn code() -> &'static str {
     static CODE: LazyLock<String> = LazyLock::new(|| {
         let mut crates = vec![
@@ -42,7 +41,7 @@ pub(crate) fn code() -> &'static str {
     &CODE
 }
 
-/// Our other crates, where their sources are not beside this one: crates of a registry, whose versions stand for their contents.
+/// Types of the other workspace crates, used if their sources are not next to this one: registry crates, identified by their versions.
 fn neighbours() -> [TypeId; 6] {
     [
         TypeId::of::<ppa_ct::Volume>(),

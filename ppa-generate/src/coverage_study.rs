@@ -1,4 +1,4 @@
-//! Where a camera in the room of a plan would see most of a limb's joint.
+//! Comparison of camera positions in the room of a plan by how much of a limb's joint they see.
 
 use nalgebra::{Isometry3, Point3};
 use ppa_core::TransformRows;
@@ -13,17 +13,17 @@ use crate::closed_skin::closed_skin;
 use crate::prepared_limb::PreparedLimb;
 use crate::scene_setup::{SceneSetup, SceneSetupError};
 
-/// Why places of a camera cannot be compared.
+/// Why camera positions cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoverageStudyError {
-    /// A skin that cannot be rendered.
+    /// A skin cannot be rendered.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// The skin near the joint, or a setting.
+    /// There is no skin near the joint, or a setting is out of range.
     #[error(transparent)]
     Coverage(#[from] CoverageError),
-    /// Furniture that cannot be rendered.
+    /// The furniture cannot be rendered.
     #[error(transparent)]
     SceneSetup(#[from] SceneSetupError),
 }
@@ -31,20 +31,20 @@ pub enum CoverageStudyError {
 /// A camera somewhere in the room.
 #[derive(Debug, Clone)]
 pub struct CameraPlace {
-    /// What it is called.
+    /// Name of the place.
     pub name: String,
-    /// Its lens.
+    /// Lens of the camera.
     pub camera: Camera,
-    /// Where it stands, mm.
+    /// Pose of the camera in the room, mm.
     pub room_from_camera: Isometry3<f64>,
 }
 
-/// What cameras see of a joint.
+/// Coverage of a joint by cameras.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoverageStudy {
-    /// The joint in the room.
+    /// Centre of the joint in the room.
     pub joint_mm: [f64; 3],
-    /// Area of the skin near it.
+    /// Area of the skin near the joint.
     pub surface_mm2: f64,
     /// Skin within this distance of the joint counts.
     pub radius_mm: f64,
@@ -57,17 +57,17 @@ pub struct CoverageStudy {
 /// What a camera sees from one place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RankedPlace {
-    /// From 1.
+    /// Rank, counted from 1.
     pub rank: usize,
-    /// What it is called.
+    /// Name of the place.
     pub name: String,
-    /// Where it is, seen from the joint.
+    /// Position of the camera relative to the joint.
     #[serde(flatten)]
     pub viewpoint: Viewpoint,
-    /// What it sees.
+    /// Coverage of the joint.
     #[serde(flatten)]
     pub coverage: Coverage,
-    /// Where it stands, row-major, mm.
+    /// Pose of the camera in the room, row-major, mm.
     pub room_from_camera: TransformRows,
 }
 
@@ -82,7 +82,7 @@ pub struct JointInRoom<'a> {
 }
 
 impl<'a> JointInRoom<'a> {
-    /// Lays a limb on the table, turned medially by an angle in radians.
+    /// Lays a limb on the table, rotated medially by an angle in radians.
     ///
     /// # Errors
     /// [`PlaceError`] when it does not rest there.
@@ -123,7 +123,7 @@ impl<'a> JointInRoom<'a> {
             .collect()
     }
 
-    /// What cameras see of the skin near the joint, where neither limb nor furniture hides it.
+    /// Ranks cameras by what they see of the skin near the joint, where neither limb nor furniture hides it.
     ///
     /// # Errors
     /// [`CoverageStudyError`] for a setting out of range, or if there is no skin near the joint.
@@ -135,7 +135,7 @@ impl<'a> JointInRoom<'a> {
         let (skin, walls) = (&self.limb.limb.mesh, &self.limb.limb.walls);
         let mesh = MeshBody::new(&skin.vertices, &skin.triangles)?;
         let surface = JointSurface::new(&mesh, &self.joint_in_ct, settings)?;
-        // Where the scan cuts the limb no skin is to be seen, but what is behind is hidden.
+        // A cut face of the limb shows no skin, but hides what is behind it.
         let limb = closed_skin(&walls.vertices(skin), skin, walls)?;
         let furniture = self.setup.table.furniture()?;
         let see = |place: &CameraPlace| {

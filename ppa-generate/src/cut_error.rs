@@ -17,7 +17,7 @@ pub enum PoseImage {
 }
 
 impl PoseImage {
-    /// Key of the plan that limits how much of it may be cut.
+    /// Key of the plan that limits how much of the image may be cut.
     fn key(self) -> &'static str {
         match self {
             Self::Depth(_) => "depth.max_cut_share",
@@ -36,7 +36,7 @@ impl fmt::Display for PoseImage {
     }
 }
 
-/// Regions of which more is cut than the plan allows.
+/// More of a region is cut than the plan allows.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "limb {} of patient {}: the field of view of the scan cuts off {}; raise the limit in the plan, use another camera, \
@@ -53,17 +53,17 @@ pub struct CutError {
 /// The region that exceeds a limit most, over all poses of a limb.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExceededLimit {
-    /// Half degrees of medial rotation.
+    /// Medial rotation in half degrees.
     pub step: u32,
     /// The image.
     pub image: PoseImage,
-    /// Share of its region, 0 to 1.
+    /// Share of its region that is cut, 0 to 1.
     pub share: f64,
     /// Largest share that the plan allows.
     pub limit: f64,
-    /// Poses that exceed this limit.
+    /// Number of poses that exceed this limit.
     pub exceeding: usize,
-    /// Poses of the limb.
+    /// Number of poses of the limb.
     pub poses: usize,
 }
 

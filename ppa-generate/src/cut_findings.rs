@@ -1,4 +1,4 @@
-//! Where the field of view of a scan cuts its limb, as found when the limb is prepared.
+//! Findings about faces where the field of view of a scan cuts the limb.
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{CutWalls, Mesh};
@@ -9,8 +9,8 @@ use ppa_dataset::findings::{Finding, FindingCode, Severity};
 /// A wall is an end of the limb if its normal is within 45 degrees of the axis.
 const LEAST_COS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// A caution for each face of the scan that cuts the limb, but not where a limb extends beyond any scan: the proximal end, and the distal
-/// end of all but lower legs with their foot.
+/// Returns a caution for each face of the scan that cuts the limb, except where a limb extends beyond any scan: at the proximal end, and at
+/// the distal end of all but lower legs with their foot.
 pub(crate) fn cuts(walls: &CutWalls, skin: &Mesh, landmarks: &Landmarks) -> Vec<Finding> {
     let joint = Point3::from(landmarks.joint_centre);
     let axis = Vector3::from(landmarks.axis_direction).normalize();

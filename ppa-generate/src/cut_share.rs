@@ -14,7 +14,7 @@ use crate::cut_error::{CutError, ExceededLimit, MAX_CUT_SHARE, PoseImage};
 use crate::pose_error::PoseError;
 use crate::scene_setup::PlacedCamera;
 
-/// Columns or rows at which a radiograph's rays are sampled; fewer where its detector has fewer.
+/// Columns or rows at which a radiograph's rays are sampled; fewer if its detector has fewer.
 const MOST_RAYS: u32 = 512;
 
 /// Walls of a limb as cameras and the x-ray tube see them.
@@ -26,7 +26,7 @@ pub(crate) struct CutFaces {
 }
 
 impl CutFaces {
-    /// For the walls of a skin and the detector of all its radiographs.
+    /// Prepares the walls of a skin for the detector of all its radiographs.
     pub fn new(
         walls: &CutWalls,
         skin: &Mesh,
@@ -57,8 +57,8 @@ impl CutFaces {
         self.from_tube.is_none()
     }
 
-    /// Share of the region's pixels at whose centre the camera sees a wall, and nothing before it. `in_room` moves points
-    /// of the scan as the limb was moved.
+    /// Share of the region's pixels at whose centre the camera sees a wall, with nothing in front of it. `in_room` moves points of the scan
+    /// as the limb was moved.
     pub fn in_region(
         &self,
         camera: &PlacedCamera,
@@ -74,9 +74,9 @@ impl CutFaces {
         Ok(share(roi, background.width, &seen.wall_pixels))
     }
 
-    /// Share of the rays of a radiograph's region that pass through a wall: they enter or leave the scan inside the limb, so that part of what they
-    /// pass through is missing. The region is the square of `roi_mm` around the joint (`ct` frame) as it falls on the
-    /// detector, or the whole detector where that misses it.
+    /// Share of the rays of a radiograph's region that pass through a wall: they enter or leave the scan inside the limb, so that part of
+    /// what they pass through is missing. The region is the square of `roi_mm` around the joint (`ct` frame), projected on the detector, or
+    /// the entire detector if it misses that.
     pub fn in_radiograph(
         &self,
         ct_from_device: &Isometry3<f64>,
@@ -101,7 +101,7 @@ impl CutFaces {
     }
 }
 
-/// Share of a region's pixels that are among `pixels`, row-major indices of an image that wide.
+/// Share of a region's pixels that are among `pixels`, row-major indices in an image of this width.
 pub(crate) fn share(roi: &Roi, width: u32, pixels: &[u32]) -> f64 {
     let within = |start: u32, at: u32| (start..start + roi.size).contains(&at);
     let inside = pixels
@@ -110,8 +110,8 @@ pub(crate) fn share(roi: &Roi, width: u32, pixels: &[u32]) -> f64 {
     inside.count() as f64 / f64::from(roi.size).powi(2)
 }
 
-/// Whether none of what lies between points of the room can be in a camera's region: the boxes around both in X/Z and Y/Z are
-/// disjoint. Exact for points before the camera, whatever the lens.
+/// Whether the convex hull of points of the room is outside a camera's region: no ray of the region is inside the box around the points in
+/// X/Z and Y/Z. Holds for points in front of the camera and any lens.
 fn is_beside(camera: &PlacedCamera, roi: &Roi, points: &[Point3<f32>]) -> bool {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for point in points {
@@ -138,7 +138,7 @@ fn is_beside(camera: &PlacedCamera, roi: &Roi, points: &[Point3<f32>]) -> bool {
     })
 }
 
-/// The tube as a pinhole camera, on whose image plane the detector lies: columns along device x, rows along device y.
+/// The tube as a pinhole camera whose image plane holds the detector: columns along device x, rows along device y.
 fn tube(detector: &Detector, source_detector_mm: f64) -> Result<Camera, CameraError> {
     let binned = detector
         .columns
@@ -147,7 +147,7 @@ fn tube(detector: &Detector, source_detector_mm: f64) -> Result<Camera, CameraEr
         .max(1);
     let [width, height] = [detector.columns, detector.rows].map(|pixels| pixels.div_ceil(binned));
     let pixel_mm = detector.pixel_mm * f64::from(binned);
-    // Of the first pixel's centre from the detector's, in pixels; the last one may be cut.
+    // Distance of the central beam from the first pixel's centre, in pixels; the last pixel may be cut.
     let first = |pixels: u32, centre_mm: f64| {
         0.5 * f64::from(pixels) / f64::from(binned) - 0.5 - centre_mm / pixel_mm
     };
@@ -180,15 +180,15 @@ pub(crate) struct PoseCuts {
 }
 
 impl PoseCuts {
-    /// Share of the radiograph's region.
+    /// Share of the radiograph's region that is cut.
     pub fn of_radiograph(&self) -> f64 {
         let of =
             |(image, share): &(PoseImage, f64)| (*image == PoseImage::Radiograph).then_some(*share);
         self.shares.iter().find_map(of).unwrap_or_default()
     }
 
-    /// The image of which most is cut, if that is more than [`MAX_CUT_SHARE`]; shares in whole percent, so that poses
-    /// alike have one finding. The place is the centre of the cut nearest to the joint.
+    /// Finding about the image with the largest cut, if that exceeds [`MAX_CUT_SHARE`]; shares are in whole percent, so that similar poses
+    /// have one finding. Its place is the centre of the cut nearest to the joint.
     pub fn finding(&self, walls: &CutWalls, skin: &Mesh, joint: &Point3<f64>) -> Option<Finding> {
         let (image, share) = self.shares.iter().copied().reduce(worse)?;
         if share <= MAX_CUT_SHARE {
@@ -213,7 +213,7 @@ impl PoseCuts {
     }
 }
 
-/// Refuses a limb of which a region is cut by more than its limit: depth images, radiographs.
+/// Refuses a limb with a region that is cut by more than its limit; `limits` are those of depth images and radiographs.
 pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Result<(), CutError> {
     let is_radiograph = |image| image == PoseImage::Radiograph;
     let worst = [false, true].into_iter().zip(limits);
@@ -229,7 +229,7 @@ pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Resul
                 .iter()
                 .filter_map(|pose| Some((pose.step, above(pose)?)))
                 .collect();
-            // The first of equal ones, so that the message is always the same.
+            // The first of equal ones is taken, so that the message is always the same.
             let &(step, (image, share)) = above
                 .iter()
                 .reduce(|a, b| if b.1.1 > a.1.1 { b } else { a })?;
@@ -249,7 +249,7 @@ pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Resul
     }
 }
 
-/// The image of which more is cut; the first of equal ones.
+/// The image with the larger cut; the first of equal ones.
 fn worse(a: (PoseImage, f64), b: (PoseImage, f64)) -> (PoseImage, f64) {
     if b.1 > a.1 { b } else { a }
 }
@@ -310,7 +310,7 @@ mod tests {
         assert_eq!(check(LIMB, &poses, [0.034, 0.03]), Ok(()));
     }
 
-    /// A square wall of 40 mm at half the way: 80 mm of the detector.
+    /// A square wall of 40 mm, halfway to the detector, covers 80 mm of it.
     #[test]
     fn rays_through_a_wall_are_counted_on_the_detector() {
         let corners = [[-20.0, -20.0], [20.0, -20.0], [20.0, 20.0], [-20.0, 20.0]];
@@ -324,7 +324,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             ..CutWalls::default()
         };
-        // 200 x 160 mm, moved along with what it shows; in one image the pixels are many, in the other few.
+        // 200 x 160 mm, shifted together with the wall; once with many pixels, once with few.
         for (columns, rows, pixel_mm) in [(2000, 1600, 0.1), (100, 80, 2.0)] {
             let detector = Detector::centred(columns, rows, pixel_mm).with_centre_mm([20.0, 0.0]);
             let cut = CutFaces::new(&walls, &skin, &detector, 1000.0).unwrap();
@@ -336,7 +336,7 @@ mod tests {
             close(of(40.0, 10.0), 1.0);
             close(of(60.0, 10.0), 4.0 / 9.0);
             close(of(40.0, 30.0), 0.5);
-            // Beside the detector: all of it counts.
+            // Outside the detector: all of it counts.
             close(of(40.0, 500.0), 80.0 * 80.0 / (200.0 * 160.0));
             let behind = Isometry3::translation(0.0, 0.0, 100.0);
             let joint = Point3::new(0.0, 0.0, 700.0);

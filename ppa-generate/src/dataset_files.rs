@@ -42,7 +42,7 @@ impl DatasetFiles {
         self.archive.as_ref().is_some_and(ArchivedDataset::is_empty)
     }
 
-    /// Whether it is an archive that was written as a whole, after the last pose.
+    /// Whether it is a complete archive, written after the last pose.
     pub fn is_finished_archive(&self) -> bool {
         let archive = self.archive.as_ref();
         archive.is_some_and(ArchivedDataset::is_finished)
@@ -64,7 +64,7 @@ impl DatasetFiles {
         self.root.join(file)
     }
 
-    /// Reads a file; `None` where there is none of this name.
+    /// Reads a file; `None` if there is none of this name.
     pub fn read(&self, file: &str) -> Result<Option<Vec<u8>>, FileError> {
         if let Some(archive) = &self.archive {
             return archive.read(file);
@@ -76,7 +76,7 @@ impl DatasetFiles {
         }
     }
 
-    /// Reads a file.
+    /// Reads a file that must exist.
     pub fn required(&self, file: &str) -> Result<Vec<u8>, FileError> {
         self.read(file)?.ok_or_else(|| self.absent(file))
     }
@@ -95,7 +95,7 @@ impl DatasetFiles {
             .map_err(FileError::at("read", &self.path(file)))
     }
 
-    /// Bytes of a file; `None` where there is none of this name.
+    /// Size of a file in bytes; `None` if there is none of this name.
     pub fn size(&self, file: &str) -> Option<u64> {
         match &self.archive {
             Some(archive) => archive.size(file),
@@ -103,14 +103,14 @@ impl DatasetFiles {
         }
     }
 
-    /// What the dataset is to hold.
+    /// Intended content of the dataset.
     pub fn planned(&self) -> Result<Planned, FileError> {
         let text = self.text(DESCRIPTION_FILE)?;
         let text = text.ok_or_else(|| self.absent(DESCRIPTION_FILE))?;
         Planned::of_text(text, &self.path(DESCRIPTION_FILE))
     }
 
-    /// The part of its plan that it is to hold.
+    /// The part of its plan that the dataset should hold.
     pub fn part(&self) -> Result<Part, FileError> {
         match self.text(PART_FILE)? {
             None => Ok(Part::WHOLE),

@@ -1,4 +1,4 @@
-//! A dataset's folder, claimed by one run that writes, or by any number of readers.
+//! Locks on a dataset's folder: one writing run or any number of readers.
 
 use std::fs;
 use std::io;
@@ -18,7 +18,7 @@ use crate::survey::DatasetDiffers;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FolderError {
-    /// The folder holds poses that the run does not.
+    /// The folder holds poses that are not in the run.
     #[error(
         "{} holds a dataset of another plan or shard (its {record} is not in this one); choose another folder",
         root.display()
@@ -29,7 +29,7 @@ pub enum FolderError {
         /// The record of a pose that is not in the run.
         record: String,
     },
-    /// The folder holds what the run would replace.
+    /// The folder holds files that the run would replace.
     #[error("{0}")]
     Differs(Box<DatasetDiffers>),
     /// The folder holds another part of the plan.
@@ -57,13 +57,13 @@ pub enum FolderError {
     WithoutRecords {
         /// The dataset's folder.
         root: PathBuf,
-        /// What it holds.
+        /// Name of a file or folder of the dataset.
         found: String,
     },
-    /// Another process relies on its files.
+    /// Another process is using its files.
     #[error("{} is in use by another process that writes or checks it", .0.display())]
     Busy(PathBuf),
-    /// A file of the dataset.
+    /// A file of the dataset cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -82,10 +82,10 @@ fn how_to_ask(part: Part) -> String {
     }
 }
 
-/// Held while a process relies on a dataset's files; released when dropped or when the process dies.
+/// Lock held while a process uses a dataset's files; released on drop or when the process dies.
 pub(crate) struct DatasetLock(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
 
-/// Locks a folder or an archive that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
+/// Locks a folder or archive that holds a dataset, finished or not, for reading. Writes nothing; several readers may hold the lock.
 pub(crate) fn lock_existing(root: &Path) -> Result<DatasetLock, FolderError> {
     let path = match is_archive(root) {
         true => root.to_owned(),
@@ -130,7 +130,7 @@ fn lock_file(root: &Path) -> PathBuf {
     root.join(FOLDER).join("lock")
 }
 
-/// Opens an archive, which is created where it does not exist, and locks it for a run that writes.
+/// Opens an archive, creating it if it does not exist, and locks it for a run that writes.
 pub(crate) fn lock_archive(path: &Path) -> Result<fs::File, FolderError> {
     let folder = path.parent().filter(|above| !above.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
@@ -140,7 +140,7 @@ pub(crate) fn lock_archive(path: &Path) -> Result<fs::File, FolderError> {
         let options = options.read(true).write(true).create(true).truncate(false);
         let file = options.open(path).map_err(FileError::at("create", path))?;
         require_lock(path, path, file.try_lock())?;
-        // Another run may have put a finished archive in its place between opening and locking.
+        // Another run may have replaced it by a finished archive between opening and locking.
         if is_of_path(&file, path).map_err(FileError::at("read", path))? {
             return Ok(file);
         }
@@ -163,7 +163,7 @@ fn is_of_path(_: &fs::File, _: &Path) -> io::Result<bool> {
     Ok(true)
 }
 
-/// Refuses a dataset whose lock file, of the given path, another process holds.
+/// Refuses a dataset whose lock file `file` is held by another process.
 fn require_lock(
     root: &Path,
     file: &Path,
@@ -175,7 +175,7 @@ fn require_lock(
     })
 }
 
-/// What a folder without records is.
+/// The error for a folder without records.
 fn not_a_dataset(root: &Path) -> Result<FolderError, FileError> {
     let mut names = Vec::new();
     for entry in fs::read_dir(root).map_err(FileError::at("read", root))? {

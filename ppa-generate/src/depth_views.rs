@@ -20,13 +20,13 @@ use crate::shaped_skin::body_shape;
 /// What one camera sees.
 #[derive(Debug, Clone)]
 pub struct DepthView {
-    /// Which camera.
+    /// Left or right camera.
     pub view: View,
-    /// Its lens.
+    /// Lens of the camera.
     pub camera: Camera,
     /// The limb in the room; depths in mm, 0 where nothing is seen.
     pub image: DepthImage,
-    /// Square around the joint, as in `roi_depth.json`; none where it is not in the image.
+    /// Square around the joint, as in `roi_depth.json`; `None` if it is not in the image.
     pub region: Option<Roi>,
 }
 
@@ -34,7 +34,7 @@ pub struct DepthView {
 pub struct VisibleLimb {
     prepared: Arc<PreparedLimb>,
     shape: BodyShape,
-    /// The skin of another body shape.
+    /// The skin of another body shape; `None` for that of the scan.
     shaped: Option<Mesh>,
     /// The closed skin in the `ct` frame.
     rigid: Arc<Body>,
@@ -68,10 +68,10 @@ impl VisibleLimb {
         })
     }
 
-    /// The same limb in a body shape of a plan's dataset, where it is `limb`.
+    /// Returns the same limb in a body shape, as limb `limb` of a plan's dataset.
     ///
     /// # Errors
-    /// [`PoseError`] for a skin that has no such shape or cannot be rendered.
+    /// [`PoseError`] if the skin cannot be shaped or rendered.
     pub fn with_shape(
         &self,
         shape: BodyShape,
@@ -108,9 +108,9 @@ impl VisibleLimb {
         &self.prepared
     }
 
-    /// The skin where the limb lies; flattened if soft tissue gives way.
+    /// Returns the skin of the placed limb, flattened if soft tissue yields.
     ///
-    /// Pixels that see a cut face of the field of view are as [`DepthSettings::cut_faces`](crate::DepthSettings) of `plan` says.
+    /// Pixels that see a cut face of the field of view follow [`DepthSettings::cut_faces`](crate::DepthSettings) of `plan`.
     ///
     /// # Errors
     /// [`PoseError`] when the skin cannot be rendered.
@@ -134,9 +134,9 @@ impl VisibleLimb {
         })
     }
 
-    /// Depth images of the limb, turned by `angle_deg` and laid on the table of a scene setup; left camera first.
+    /// Renders the limb, rotated by `angle_deg` and laid on the table of a scene setup; left camera first.
     ///
-    /// `plan` is the plan of the scene setup. Ideal images are those of the plan's dataset; those of a sensor have noise of `seed`.
+    /// `plan` is the plan of the scene setup. Ideal images equal those of the plan's dataset; those of a sensor have noise from `seed`.
     ///
     /// # Errors
     /// [`PoseError`] when the limb does not rest on the table, hides a camera, or a sensor measures nothing.
@@ -153,7 +153,7 @@ impl VisibleLimb {
         let place = |skin| (setup.table).place(skin, landmarks, angle_rad, &settings);
         let mut skin = self.posed(&place(self.skin())?, plan)?;
         if self.shaped.is_some() {
-            // The skin of the scan decides the regions, as in the dataset.
+            // The skin of the scan determines the regions, as in the dataset.
             skin.joint_in_room = self.joint_in_room(&place(&self.prepared.limb.mesh)?);
         }
         let cameras = setup.cameras.iter();
@@ -162,7 +162,7 @@ impl VisibleLimb {
 }
 
 impl PosedSkin {
-    /// What a camera sees of it; a sensor has noise of `seed`.
+    /// Renders what a camera sees of the skin; a sensor has noise from `seed`.
     ///
     /// # Errors
     /// [`PoseError`] when the limb hides the camera, or its sensor measures nothing.

@@ -17,7 +17,7 @@ use crate::scene_setup::SceneSetup;
 use crate::seal::sealed;
 use crate::shaped_skin::ShapeSettings;
 
-/// The settings of a plan that decide the bytes of its images; files stand by their hashes.
+/// The settings of a plan that determine the bytes of its images; files are represented by their hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Settings {
     /// Program and version that made the images.
@@ -30,7 +30,7 @@ pub(crate) struct Settings {
     shapes: ShapeSettings,
     /// How deeply heel and calf are indented where they rest on the table.
     soft_tissue: SoftTissue,
-    /// Errors of positioning; left out where there are none.
+    /// Errors of positioning; left out if there are none.
     #[serde(skip_serializing_if = "Positioning::is_default")]
     positioning: Positioning,
     /// SHA-256 of the point cloud of a recorded room; `null` for the built-in one.
@@ -39,11 +39,11 @@ pub(crate) struct Settings {
     room: RoomSpec,
     /// How the table plane is searched for; `null` if it is the surface that the central beam hits first.
     table: Option<PlaneSettings>,
-    /// Pose of the x-ray device in a recorded room, row-major, mm; `null` where the plan gives none.
+    /// Pose of the x-ray device in a recorded room, row-major, mm; `null` if the plan gives none.
     room_from_device: Option<TransformRows>,
     /// SHA-256 of the camera rig's file; `null` without a file.
     rig_sha256: Option<String>,
-    /// The camera rig, where the plan or its room file writes it out.
+    /// The camera rig, if it is given in the plan or its room file.
     #[serde(skip_serializing_if = "Option::is_none")]
     cameras: Option<RigSpec>,
     /// Side of the square region of interest around the joint, mm at the joint.
@@ -77,7 +77,7 @@ impl Settings {
             roi_mm: plan.depth.roi_mm,
             sensor: plan.depth.sensor.clone(),
             cut_faces: plan.depth.cut_faces,
-            // Limits decide which images there are, not what is in them.
+            // Limits decide which images are made, not their content.
             xray: XraySettings {
                 max_cut_share: XraySettings::default().max_cut_share,
                 ..plan.xray.clone()
@@ -85,7 +85,7 @@ impl Settings {
         })
     }
 
-    /// Hash of everything the images of a limb follow from, but the pose.
+    /// Hash of everything that determines the images of a limb, except the pose.
     pub fn limb_key(&self, id: LimbId, case: &Case) -> String {
         let address = (
             self,
@@ -108,7 +108,7 @@ pub(crate) struct Description<'a> {
     units: &'static str,
     /// Medial rotations about the limb's axis.
     rotation: Sweep,
-    /// Settings that decide the bytes of the images.
+    /// Settings that determine the bytes of the images.
     settings: &'a Settings,
     /// Pose of the x-ray device in the room, row-major, mm.
     room_from_device: TransformRows,
@@ -132,7 +132,7 @@ struct Table {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct CameraRow {
-    /// Which camera it is.
+    /// Left or right camera.
     view: View,
     /// Its intrinsics.
     intrinsics: CameraSpec,
@@ -151,7 +151,7 @@ struct LimbRow<'a> {
     volume_sha256: &'a str,
     /// How the skin is found and separated from the couch.
     surface: &'a LimbSettings,
-    /// Landmark decisions of a person.
+    /// Landmarks chosen by a person.
     choices: &'a LandmarkOverrides,
     /// Codes of findings that a person has accepted.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]

@@ -7,9 +7,9 @@ use serde_json::Value;
 /// A key of `dataset.json` with two values.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyDifference {
-    /// Path of the key, as `settings.xray.kvp` or `limbs.patient_0_r.choices`.
+    /// Path of the key, such as `settings.xray.kvp` or `limbs.patient_0_r.choices`.
     pub key: String,
-    /// Its value in the dataset as JSON; `None` where the key is missing.
+    /// Its value in the dataset as JSON; `None` if the key is missing.
     pub there: Option<String>,
     /// Its value in the run, likewise.
     pub here: Option<String>,
@@ -27,7 +27,7 @@ impl fmt::Display for KeyDifference {
     }
 }
 
-/// A value that may be a whole table, cut to what fits into a sentence.
+/// A value, which may be a table, shortened to fit into a sentence.
 fn short(text: &str) -> String {
     const MOST: usize = 60;
     if text.chars().count() <= MOST {
@@ -36,7 +36,7 @@ fn short(text: &str) -> String {
     text.chars().take(MOST).chain("...".chars()).collect()
 }
 
-/// The keys in which the text of one `dataset.json` differs from another, what was set before what follows from it.
+/// Returns the keys in which two texts of `dataset.json` differ, settings before values that follow from them.
 pub(crate) fn differences(there: &str, here: &str) -> Vec<KeyDifference> {
     let parse = |text| serde_json::from_str(text).unwrap_or(Value::Null);
     let mut found = Vec::new();
@@ -46,14 +46,14 @@ pub(crate) fn differences(there: &str, here: &str) -> Vec<KeyDifference> {
         Some(&parse(here)),
         &mut found,
     );
-    // Hashes of everything add nothing to the keys they are made of.
+    // Hashes add nothing to the keys that they are made of.
     let is_hash = |key: &str| key == "seal" || (key.starts_with("limbs.") && key.ends_with(".key"));
     found.retain(|difference: &KeyDifference| !is_hash(&difference.key));
     found.sort_by_key(|difference| rank(&difference.key));
     found
 }
 
-/// Settings of the plan come first, then its limbs, what follows from both, and the program.
+/// Settings of the plan come first, then its limbs, values that follow from both, and the program.
 fn rank(key: &str) -> u8 {
     match key {
         "settings.code" | "settings.generator" | "version" | "units" => 3,

@@ -1,4 +1,4 @@
-//! A limb before the x-ray device of a plan, and its exposure in a pose.
+//! A limb with the x-ray device of a plan, and its exposure in a pose.
 
 use std::sync::Arc;
 
@@ -11,14 +11,14 @@ use crate::prepared_limb::PreparedLimb;
 use crate::radiograph::{JointError, prepared_phantom, projection};
 use crate::scene_setup::{SceneSetupError, Table, spectrum};
 
-/// A limb with all that its exposures share. A clone shares it as well.
+/// A limb with the data that all its exposures and clones share.
 #[derive(Clone)]
 pub struct ExposableLimb {
     /// Skin, voxels and landmarks.
     pub prepared: Arc<PreparedLimb>,
     /// Room, table and device.
     pub table: Arc<Table>,
-    /// The beam.
+    /// The x-ray beam.
     pub spectrum: Arc<Spectrum>,
     /// The limb around the central beam as voxels of material and density, prepared for exposures of all its poses.
     pub phantom: Arc<PreparedPhantom<'static>>,
@@ -30,21 +30,21 @@ pub struct ExposableLimb {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExposureError {
-    /// The settings want other voxels than the limb has.
+    /// The settings require other voxels than the limb has.
     #[error(
         "half_length_mm, max_voxel_mm, interpolation, form_factors, calibration or engine.compton_model differ from those that the limb's voxels were made with"
     )]
     OtherVoxels,
-    /// The beam.
+    /// The x-ray beam.
     #[error(transparent)]
     Beam(#[from] SceneSetupError),
 }
 
-/// A limb that lies on the table, and the device as its scan sees it.
+/// A limb on the table, and the device in the frame of its scan.
 pub struct PosedExposure<'a> {
     /// The limb.
     pub limb: &'a ExposableLimb,
-    /// Where it lies, by the skin of the scan.
+    /// Placement of the limb, from the skin of the scan.
     pub placement: Placement,
     /// Source and detector in the `ct` frame.
     pub projection: Projection,
@@ -66,8 +66,7 @@ impl ExposableLimb {
         Ok(Self::with_phantom(prepared, phantom, plan, table, spectrum))
     }
 
-    /// As [`Self::new`], with the voxels that [`prepared_phantom`] cut out before, for a plan that changes neither them nor their
-    /// materials.
+    /// Like [`Self::new`], with voxels that [`prepared_phantom`] cut out before, for a plan that changes neither them nor their materials.
     pub fn with_phantom(
         prepared: Arc<PreparedLimb>,
         phantom: Arc<PreparedPhantom<'static>>,
@@ -85,10 +84,10 @@ impl ExposableLimb {
         }
     }
 
-    /// The same voxels under another tube, beam, detector or engine.
+    /// Returns the same voxels with another tube, beam, detector or engine.
     ///
     /// # Errors
-    /// [`ExposureError`] when the settings want other voxels, or their beam cannot be made.
+    /// [`ExposureError`] if the settings require other voxels, or their beam cannot be computed.
     pub fn exposed_by(&self, xray: XraySettings) -> Result<Self, ExposureError> {
         if !xray.same_voxels(&self.xray) {
             return Err(ExposureError::OtherVoxels);
@@ -109,7 +108,7 @@ impl ExposableLimb {
         })
     }
 
-    /// Lays a skin of the limb on the table, turned medially by an angle in radians.
+    /// Lays a skin of the limb on the table, rotated medially by an angle in radians.
     ///
     /// # Errors
     /// [`PlaceError`] when it does not rest there.
@@ -118,7 +117,7 @@ impl ExposableLimb {
         (self.table).place(skin, landmarks, angle_rad, &self.place_settings)
     }
 
-    /// The exposure of the limb turned medially by an angle in radians.
+    /// The exposure of the limb rotated medially by an angle in radians.
     ///
     /// # Errors
     /// [`PlaceError`] when it does not rest on the table.
@@ -127,7 +126,7 @@ impl ExposableLimb {
         Ok(self.placed(placement))
     }
 
-    /// The exposure of the limb as it lies.
+    /// The exposure of the placed limb.
     pub fn placed(&self, placement: Placement) -> PosedExposure<'_> {
         let device = &self.table.room.device;
         PosedExposure {
@@ -152,7 +151,7 @@ impl PosedExposure<'_> {
     /// The settings with the histories of the plan's tube load, if it has one.
     ///
     /// # Errors
-    /// As [`PreparedPhantom::histories`].
+    /// The same as [`PreparedPhantom::histories`].
     pub fn fast_settings(&self, settings: FastSettings) -> Result<FastSettings, TransportError> {
         let ExposableLimb {
             phantom, spectrum, ..
@@ -164,10 +163,10 @@ impl PosedExposure<'_> {
         Ok(settings.with_dose_histories(dose_histories))
     }
 
-    /// The radiograph by the plan's engine.
+    /// Computes the radiograph with the plan's engine.
     ///
     /// # Errors
-    /// [`TransportError`] when geometry, beam or a setting of the engine makes no sense.
+    /// [`TransportError`] if geometry, beam or a setting of the engine is invalid.
     pub fn radiograph(&self, seed: u64) -> Result<Radiograph, TransportError> {
         let ExposableLimb {
             phantom, spectrum, ..

@@ -22,19 +22,19 @@ use crate::status::status;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ForecastError {
-    /// A pose of the sample, or what it needs.
+    /// A pose of the sample cannot be made.
     #[error(transparent)]
     Generate(#[from] GenerateError),
-    /// The temporary folder of the sample.
+    /// The temporary folder of the sample cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It was asked to stop.
+    /// The forecast was asked to stop.
     #[error("not all poses of the sample were measured")]
     Stopped(#[from] Stopped),
-    /// A share that is none.
+    /// The fraction is not between 0 and 1.
     #[error("the fraction is {0}, expected a number from 0 to 1")]
     Fraction(f64),
-    /// The images will not fit.
+    /// The images do not fit on the disk.
     #[error(
         "the plan's images need {needed} more bytes in {}, but only {free} are free",
         root.display()
@@ -42,7 +42,7 @@ pub enum ForecastError {
     NoRoom {
         /// The dataset's folder.
         root: PathBuf,
-        /// Bytes of the images that are not there yet.
+        /// Bytes of the images that do not exist yet.
         needed: u64,
         /// Free bytes of its file system.
         free: u64,
@@ -52,7 +52,7 @@ pub enum ForecastError {
 /// Estimated cost of a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Forecast {
-    /// Limbs.
+    /// Number of limbs.
     pub limbs: usize,
     /// Poses of all limbs.
     #[serde(rename = "units")]
@@ -61,35 +61,35 @@ pub struct Forecast {
     pub depth_images: usize,
     /// Radiographs.
     pub radiographs: usize,
-    /// Poses that were made to measure.
+    /// Poses that were made as a sample.
     pub measured: usize,
-    /// Processor time of a pose in seconds, mean of those measured.
+    /// Mean processor time of the measured poses in seconds.
     pub cpu_s_per_unit: f64,
     /// Standard error of that mean; absent for a single pose.
     pub cpu_s_per_unit_error: Option<f64>,
-    /// Processor time in seconds to read and shape a limb, mean of all.
+    /// Mean processor time to read and shape a limb in seconds.
     pub cpu_s_per_limb: f64,
     /// Processor time of the plan in hours.
     pub cpu_hours: f64,
     /// Bytes of all images.
     pub bytes: u64,
-    /// Bytes of those that are not there yet.
+    /// Bytes of the images that do not exist yet.
     pub needed_bytes: u64,
-    /// Free bytes where the dataset will lie, if the system reports it.
+    /// Free bytes in the file system of the dataset, if the system reports them.
     pub free_bytes: Option<u64>,
-    /// Doubts about the limbs.
+    /// Findings about the limbs.
     #[serde(skip_serializing_if = "Findings::is_empty")]
     pub findings: Findings,
 }
 
-/// Prepares every limb of the plan, makes `fraction` of its poses, at least one, in a temporary
-/// folder, one after the other, and estimates what all will take in the folder `root`.
+/// Prepares every limb of the plan, makes `fraction` of its poses, at least one, in a temporary folder, one after the other, and estimates
+/// the cost of all poses in the folder `root`.
 ///
-/// Of a plan with many analog histories, two short exposures of each pose are measured instead, and the time of all histories
-/// follows from their difference.
+/// For a plan with many analog histories, two short exposures of each pose are measured instead, and the time of all histories follows from
+/// their difference.
 ///
-/// The poses are spread evenly, and differently for every limb. What cannot work with one of them
-/// would not work in the run. Once `stop` is true no other pose begins. Whether the disk has room for all is for [`Forecast::fits`] to say.
+/// The poses are spread evenly, and differently for every limb. A pose that fails here would also fail in the run. Once `stop` is true no
+/// other pose begins. [`Forecast::fits`] checks whether the disk has room for all.
 ///
 /// # Errors
 /// [`ForecastError`], naming the case or pose that rules the plan out.
@@ -109,7 +109,7 @@ pub fn forecast(
     let work = &works[0];
     let poses = plan.rotation.poses().map_err(GenerateError::from)?;
     let limbs = jobs_of_part(work.planned(), &poses, Part::WHOLE);
-    // None stays prepared: the time of all of them is measured.
+    // No limb stays prepared, since the time of preparing each is measured.
     let findings = work.findings(&limbs, root, 0)?;
     progress(Progress::Findings(&findings));
     let of_limb = ((poses.len() as f64 * fraction).round() as usize).max(1);
@@ -183,7 +183,7 @@ impl Forecast {
     }
 }
 
-/// Analog histories that are followed to measure the time of more.
+/// Analog histories followed in the shorter of two measurements.
 const MEASURED_HISTORIES: u64 = 2_000_000;
 
 /// The plans to measure: the plan itself, or for many analog histories one plan with few and one with twice as many, whose
@@ -231,7 +231,7 @@ fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
     (mean, error)
 }
 
-/// Free bytes of the file system that holds `root`, or its nearest folder that exists.
+/// Free bytes of the file system that holds `root`, or its nearest existing parent.
 #[cfg(unix)]
 pub fn free_bytes(root: &Path) -> Option<u64> {
     let root = std::path::absolute(root).ok()?;
@@ -241,7 +241,7 @@ pub fn free_bytes(root: &Path) -> Option<u64> {
     Some(disk.f_bavail * disk.f_frsize)
 }
 
-/// Other systems are not asked.
+/// Not implemented for other systems.
 #[cfg(not(unix))]
 pub fn free_bytes(_: &Path) -> Option<u64> {
     None
@@ -308,7 +308,7 @@ mod tests {
             .map(|plan| plan.xray.analog.unwrap().histories);
         let expected = [MEASURED_HISTORIES, 2 * MEASURED_HISTORIES];
         assert!(histories.eq(expected));
-        // 3 s of everything else, 2 s for each of the measured histories.
+        // 3 s for everything else, 2 s for each `MEASURED_HISTORIES` histories.
         assert_eq!(pose_s(&plan, &[5.0, 7.0]), 203.0);
     }
 

@@ -1,4 +1,4 @@
-//! Poses of everything in a room, named, for use in other programs.
+//! Named poses of everything in a room, for use in other programs.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,12 @@ use crate::scene_setup::{SceneSetupError, Table};
 
 /// Rigid motions by name, `target_from_source`: row-major 4x4, mm.
 ///
-/// A point p of the source frame lies at M · (x, y, z, 1) of the target frame. Frames: `ct` (LPS),
-/// `patient`, `room`, `device`, `left` and `right` (cameras, OpenCV axes). `left_from_room` takes what lies in the room to the left
-/// camera, `left_from_ct` a skin in the scan: what `ppa depth render` wants as `--camera-from-mesh`.
+/// A point (x, y, z) of the source frame is at M · (x, y, z, 1) in the target frame. Frames: `ct` (LPS), `patient`, `room`, `device`,
+/// `left` and `right` (cameras, OpenCV axes). `left_from_room` maps the room to the left camera, `left_from_ct` a skin in the scan: the
+/// `--camera-from-mesh` of `ppa depth render`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Frames {
-    /// What the numbers are.
+    /// Units and conventions of the numbers.
     pub units: &'static str,
     /// Distance of the detector from the source along z of the device.
     pub source_detector_mm: f64,
@@ -27,10 +27,10 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Device and cameras in their room.
+    /// Frames of device and cameras in their room.
     ///
     /// # Errors
-    /// [`SceneSetupError::Rig`] naming the camera whose pose is none.
+    /// [`SceneSetupError::Rig`] naming the camera whose pose is invalid.
     pub fn of_room(table: &Table, rig: &RigSpec) -> Result<Self, SceneSetupError> {
         let room_from_device = table.room.device.room_from_device;
         let mut motions =

@@ -1,4 +1,4 @@
-//! From a plan to a dataset: resumable, and the same bytes for any number of threads.
+//! Generates the dataset of a plan: resumable, and the same bytes for any number of threads.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -28,11 +28,11 @@ use crate::scene_setup::{SceneSetup, SceneSetupError};
 use crate::several_limbs::{for_each_limb, limbs_at_once};
 use crate::staging::staging_folder;
 
-/// Why a dataset could not be made. What was finished before stays and is not made again.
+/// Why a dataset could not be made. Finished poses stay and are not made again.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GenerateError {
-    /// The rotations of the plan.
+    /// The rotations of the plan are invalid.
     #[error(transparent)]
     Rotation(#[from] SweepError),
     /// A case file.
@@ -41,42 +41,42 @@ pub enum GenerateError {
     /// Room, cameras or beam.
     #[error(transparent)]
     SceneSetup(#[from] SceneSetupError),
-    /// A limb of the plan.
+    /// A limb of the plan cannot be prepared.
     #[error("cannot prepare the limb of {}", case.display())]
     Limb {
         /// Its case file.
         case: PathBuf,
-        /// What went wrong.
+        /// The cause.
         source: Box<PrepareError>,
     },
-    /// A limb of the plan cannot be shaped or turned into voxels for the radiograph.
+    /// A limb of the plan cannot be shaped or converted to voxels for the radiograph.
     #[error("cannot pose the limb of {}", case.display())]
     Posable {
         /// Its case file.
         case: PathBuf,
-        /// What went wrong.
+        /// The cause.
         source: PoseError,
     },
-    /// One pose.
+    /// A pose cannot be made.
     #[error("cannot make the pose at {angle_deg} degrees of {}", case.display())]
     Pose {
         /// Its case file.
         case: PathBuf,
         /// Medial rotation.
         angle_deg: f64,
-        /// What went wrong.
+        /// The cause.
         source: PoseError,
     },
-    /// The folder, its files, or the disk.
+    /// The folder, its files or the disk cannot be used.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// A file that the plan names.
+    /// A file that the plan names cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
     /// [`GenerateSettings::stop`] became true.
     #[error("the run ended before its last pose")]
     Stopped(#[from] Stopped),
-    /// A plan that was not read from a file, and that reading would have refused.
+    /// A plan made in memory that would be refused if it were read from a file.
     #[error("the plan cannot be used: {0}")]
     Unusable(String),
     /// Two cases would write the same files.
@@ -94,7 +94,7 @@ pub enum GenerateError {
         /// The side they share.
         side: &'static str,
     },
-    /// Two patients are one person, whose images could then stand in training and test data.
+    /// Two patients are one person, whose images could then be in both training and test data.
     #[error(
         "{} and {} come from the same scan, but are patients {} and {}; give them one number",
         first.display(), second.display(), patients[0], patients[1]
@@ -114,17 +114,17 @@ pub enum GenerateError {
 pub struct GenerateSettings<'a> {
     /// One of several equal parts of the plan; each goes into a folder of its own.
     pub part: Part,
-    /// Bytes that the images may take; poses that are being made may exceed it for a moment.
+    /// Bytes that the images may take; poses in progress may briefly exceed it.
     pub disk_limit: Option<u64>,
-    /// Once true, poses under way are finished and no other begins. Analog radiographs under way end, and the next run resumes
-    /// from their histories.
+    /// Once true, poses in progress are finished and no other begins. Analog radiographs in progress end, and the next run resumes from
+    /// their histories.
     pub stop: Option<&'a AtomicBool>,
-    /// Whether poses of other settings, scans or sources are replaced, and those that the plan does not have removed.
+    /// Whether poses of other settings, scans or sources are replaced, and those that are not in the plan removed.
     pub replace: bool,
 }
 
 impl Default for GenerateSettings<'_> {
-    /// All poses, as much disk as there is, to the end, and nothing that is there is replaced.
+    /// All poses, without disk limit and stop flag, and nothing is replaced.
     fn default() -> Self {
         Self {
             part: Part::WHOLE,
@@ -135,18 +135,17 @@ impl Default for GenerateSettings<'_> {
     }
 }
 
-/// Makes what is missing of the plan's dataset in the folder `root`, or in the tar archive of this path if it ends in `.tar`.
+/// Makes the missing poses of the plan's dataset in the folder `root`, or in the tar archive of this path if it ends in `.tar`.
 ///
-/// Every pose is generated on its own: its files appear whole, its record last, so a run that was
-/// killed resumes where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
-/// is missing or altered; files that were altered are moved to `.ppa/altered`.
+/// Every pose is generated on its own: its files appear complete, its record last, so a killed run resumes where it stopped. A pose is made
+/// again if its record is missing or damaged, or if one of its files is missing or altered; altered files are moved to `.ppa/altered`.
 ///
-/// Poses with analog radiographs are made one by one. Their histories are saved in `.ppa/histories`, or beside an archive in
+/// Poses with analog radiographs are made one by one. Their histories are saved in `.ppa/histories`, or next to an archive in
 /// `NAME.tar.histories`, until the pose is complete.
 ///
-/// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does
-/// not have is refused, unless `settings` ask to replace them. Then each of them stays until its successor is whole, and
-/// those without a successor until all others are.
+/// A folder with poses made from other inputs (plan settings, case, code and physics data) or with poses that are not in the plan is
+/// refused, unless `settings` ask to replace them. Then each of them stays until its successor is complete, and those without a successor
+/// until all others are.
 ///
 /// An archive holds the files of the folder. Poses are made in a temporary folder and added to it one by one; at the end it is
 /// written in a fixed order.
@@ -180,7 +179,7 @@ pub fn generate(
     generate_in(&work, root, settings, progress, &histories, &|_, _| Ok(()))
 }
 
-/// Makes what is missing in a folder, and calls `kept` after each pose that was made.
+/// Makes the missing poses in a folder, and calls `kept` after each of them.
 fn generate_in(
     work: &Work,
     root: &Path,
@@ -228,7 +227,7 @@ pub(crate) struct Work<'a> {
     setup: SceneSetup,
     /// `dataset.json`.
     pub description: String,
-    /// Limbs that were prepared for their findings, until their poses are made.
+    /// Limbs that were prepared for their findings, kept until their poses are made.
     prepared: Mutex<Vec<(LimbId, PreparedLimb)>>,
 }
 
@@ -265,9 +264,8 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// The findings about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
-    /// prepared for it. The first `keep` limbs stay prepared for their poses; the others are prepared twice, since memory may not
-    /// hold them all.
+    /// Returns the findings about limbs before any of their poses is made. Limbs with a pose in the folder `root` are not prepared for it.
+    /// The first `keep` limbs stay prepared for their poses; the others are prepared twice, since memory may not hold them all.
     pub fn findings(
         &self,
         limbs: &[LimbJobs],
@@ -291,7 +289,7 @@ impl<'a> Work<'a> {
         Ok(findings)
     }
 
-    /// The findings of a limb, which stays prepared for its poses if `keep` says so.
+    /// Returns the findings of a limb, which stays prepared for its poses if `keep` is true.
     fn findings_of(&self, id: LimbId, keep: bool) -> Result<Vec<Finding>, GenerateError> {
         let prepared = self.limb(id).prepared()?;
         let findings = prepared.findings.clone();
@@ -310,7 +308,7 @@ impl<'a> Work<'a> {
         limb.expect("only limbs of the plan are asked for")
     }
 
-    /// Reads, skins and shapes a limb; the result makes its poses below `root`.
+    /// Prepares and shapes a limb; the returned function makes its poses below `root`.
     pub fn prepare<'m>(
         &'m self,
         id: LimbId,

@@ -1,4 +1,4 @@
-//! Which part of its plan a folder or an archive holds.
+//! The part of its plan that a folder or archive holds.
 
 use std::path::Path;
 
@@ -12,8 +12,7 @@ use crate::part_file::{PART_FILE, read_part};
 use crate::pose_id::FOLDER;
 use crate::record::record_names;
 
-/// The part of a plan that the folder or archive `root` holds, or is to hold once the run that began it is resumed; `None`
-/// where no run has begun.
+/// Returns the part of a plan that the folder or archive `root` holds, or will hold once its run is resumed; `None` if no run has begun.
 ///
 /// # Errors
 /// [`FolderError`] when its files cannot be read or are damaged.
@@ -36,7 +35,7 @@ pub fn held_part(root: &Path) -> Result<Option<Part>, FolderError> {
     Ok(if begun { Some(read_part(root)?) } else { None })
 }
 
-/// Refuses a run that is to make another part than the folder holds.
+/// Refuses a run of another part than the folder holds.
 pub(crate) fn require_part(root: &Path, asked: Part) -> Result<(), FolderError> {
     match held_part(root) {
         Ok(Some(held)) if held != asked => Err(FolderError::OtherPart {
@@ -44,8 +43,7 @@ pub(crate) fn require_part(root: &Path, asked: Part) -> Result<(), FolderError> 
             held,
             asked,
         }),
-        // A damaged file is not that of the whole plan, which has none. Shards may resume: records that are not
-        // theirs stop them.
+        // A damaged part file is not that of the whole plan, which has none. Shards may resume: records of other shards stop them.
         Err(FolderError::File(error))
             if error.path == root.join(PART_FILE) && asked != Part::WHOLE =>
         {

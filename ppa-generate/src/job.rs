@@ -30,27 +30,27 @@ pub struct Summary {
     /// Poses of the plan, or of the shard.
     #[serde(rename = "units")]
     pub pose_jobs: usize,
-    /// Poses that were made in this run; the others were there already.
+    /// Poses that were made in this run; the others existed already.
     pub made: usize,
     /// Depth images in the folder.
     pub depth_images: usize,
     /// Radiographs in the folder.
     pub radiographs: usize,
-    /// Doubts about its limbs and poses.
+    /// Findings about its limbs and poses.
     #[serde(skip_serializing_if = "Findings::is_empty")]
     pub findings: Findings,
     /// Poses of other settings that were replaced.
     pub replaced: usize,
-    /// Poses that were removed because they are not in the plan, or the shard.
+    /// Poses that were removed because they are not in the plan or the shard.
     pub removed: usize,
     /// Files that were missing or altered and were made again, as paths from the root.
     pub healed: Vec<String>,
-    /// Where files lie now that stood in the place of others and were not written by ppa, or altered since.
+    /// New paths of files that were in the place of others and were not written by ppa, or altered since.
     pub set_aside: Vec<String>,
 }
 
 impl Summary {
-    /// Of a dataset with the given lists, in which nothing was replaced.
+    /// Summary of a dataset with the given lists, in which nothing was replaced.
     pub(crate) fn new(pose_jobs: usize, made: usize, lists: Lists) -> Self {
         let count = |kind| lists.rows.iter().filter(|row| row.kind == kind).count();
         Self {
@@ -67,10 +67,10 @@ impl Summary {
     }
 }
 
-/// What a run reports while it continues.
+/// Progress reports of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress<'a> {
-    /// The findings about the limbs, first of all.
+    /// The findings about the limbs, reported first.
     Findings(&'a Findings),
     /// The number of poses, before the first of them.
     Total(usize),
@@ -80,17 +80,17 @@ pub enum Progress<'a> {
     Made,
 }
 
-/// Why a run ended before its last pose. What was finished stays and is not made again.
+/// Why a run ended before its last pose. Finished poses stay and are not made again.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JobError {
-    /// The folder.
+    /// The folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file.
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The images would take more disk than they may.
+    /// The images would exceed the disk limit.
     #[error(
         "the images in {} would take more than {limit} bytes, of which {used} are used; raise the disk limit and run \
          again to go on",
@@ -99,17 +99,17 @@ pub enum JobError {
     DiskLimit {
         /// The dataset's folder.
         root: PathBuf,
-        /// What they may take, bytes.
+        /// Disk limit, bytes.
         limit: u64,
-        /// What the finished ones take, bytes.
+        /// Size of the finished images, bytes.
         used: u64,
     },
 }
 
-/// Makes one pose of a limb: its files whole, in the staging folder of the dataset.
+/// Makes one pose of a limb: complete files in the staging folder of the dataset.
 pub(crate) type MakePose<'a, E> = Box<dyn Fn(PoseJob) -> Result<Images, E> + Sync + 'a>;
 
-/// Pose jobs, the folder they belong to, and how much of it they may fill.
+/// Pose jobs, their folder and its disk limit.
 pub(crate) struct Job<'a> {
     pub root: &'a Path,
     /// `dataset.json`, the same for all parts.
@@ -120,14 +120,14 @@ pub(crate) struct Job<'a> {
     /// Whether poses of other settings are replaced, and those of other plans removed.
     pub replace: bool,
     pub progress: &'a (dyn Fn(Progress) + Sync),
-    /// Whether one pose is made after another, each on all threads. A thread that waits within a pose then does not start another one.
+    /// Whether poses are made one after another, each on all threads, so that a thread that waits within a pose does not start another one.
     pub one_by_one: bool,
     /// Called after each pose that was made, once it is in its place.
     pub kept: &'a (dyn Fn(PoseId, &Record) -> Result<(), FileError> + Sync),
 }
 
 impl Job<'_> {
-    /// Makes what is missing, several poses and limbs at a time; `prepare` is called once per limb.
+    /// Makes the missing poses, several poses and limbs at a time; `prepare` is called once per limb.
     pub fn complete<'m, E: From<JobError> + Send>(
         &self,
         prepare: impl Fn(&LimbJobs) -> Result<MakePose<'m, E>, E> + Sync,
@@ -175,7 +175,7 @@ impl Job<'_> {
         })
     }
 
-    /// Locks the folder, completes what a killed run left, and refuses what only a run that replaces may change.
+    /// Locks the folder, completes the poses of a killed run, and refuses changes that require `replace`.
     fn begin(&self, overview: &Overview) -> Result<(DatasetLock, Survey), FolderError> {
         let lock = lock(self.root)?;
         require_part(self.root, self.part)?;
@@ -192,7 +192,7 @@ impl Job<'_> {
         Ok((lock, survey))
     }
 
-    /// The poses that are not complete; adds the bytes of all that are there to `used`.
+    /// Returns the incomplete poses; adds the bytes of all existing images to `used`.
     fn missing(
         &self,
         limb: &LimbJobs,
@@ -249,7 +249,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Puts a pose in its place, or removes its images where they are too many bytes.
+    /// Moves a pose into place, or removes its images if they exceed the disk limit.
     fn keep(
         &self,
         pose_job: &PoseJob,
@@ -279,7 +279,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Removes the poses that the run does not have, once all others are whole.
+    /// Removes the poses that are not in the run, once all others are complete.
     fn remove_others(&self, survey: &Survey, overview: &Overview) -> Result<(), FileError> {
         if !survey.beyond.is_empty() {
             overview.open(&self.limbs)?;
@@ -287,14 +287,14 @@ impl Job<'_> {
         for &pose in &survey.beyond {
             overview.staging.remove(pose)?;
         }
-        // A plan of fewer body shapes leaves folders without images.
+        // A plan with fewer body shapes leaves folders without images.
         for file in survey.stale.iter().flat_map(|pose| pose.images()) {
             overview.staging.remove_empty_folders(&file);
         }
         Ok(())
     }
 
-    /// Writes what lists all poses: regions of interest, findings and manifest.
+    /// Writes the lists of all poses: regions of interest, findings and manifest.
     fn finish(&self, overview: &Overview) -> Result<Lists, FileError> {
         let record = |pose_job: &PoseJob| Record::read(self.root, pose_job);
         let lists = Lists::of(&self.limbs, self.description, record)?;

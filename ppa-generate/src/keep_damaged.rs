@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 
 use ppa_dataset::files::FileError;
 
-/// Gives an archive a second name, `*.damagedN`, under which it stays. Returns that name.
+/// Keeps an archive under a second name, `*.damagedN`, and returns that name.
 ///
 /// # Errors
-/// [`FileError`] where it can be neither linked nor copied.
+/// [`FileError`] if it can be neither linked nor copied.
 pub(crate) fn keep_damaged(path: &Path) -> Result<PathBuf, FileError> {
     let mut number = 1;
     loop {
         let mut name = path.as_os_str().to_owned();
         name.push(format!(".damaged{number}"));
         let kept = PathBuf::from(name);
-        // Some file systems have no second names.
+        // Some file systems have no hard links.
         match fs::hard_link(path, &kept).or_else(|error| match error.kind() {
             io::ErrorKind::AlreadyExists => Err(error),
             _ => copy(path, &kept),

@@ -41,8 +41,8 @@ impl LimbJobs {
     }
 }
 
-/// The pose jobs of one shard of a dataset. Shards are runs of neighbours, limb by limb, so that few
-/// of them prepare the same limb.
+/// Returns the pose jobs of one shard of a dataset. Shards are ranges of consecutive poses, limb by limb, so that few of them prepare the
+/// same limb.
 pub(crate) fn jobs_of_part(
     limbs: impl ExactSizeIterator<Item = PlannedLimb>,
     poses: &[PoseAngle],

@@ -13,8 +13,8 @@ use crate::record::{PoseJob, Record};
 
 /// The lists that follow from a dataset's records.
 pub(crate) struct Lists {
-    /// Path from the root and text of each, in the order in which they are written: hashes first, the manifest last, so
-    /// that it states that all is there.
+    /// Path from the root and text of each, in the order in which they are written: hashes first, the manifest last, since it marks a
+    /// complete dataset.
     pub files: Vec<(String, String)>,
     /// The rows of the manifest.
     pub rows: Vec<FileRow>,
@@ -23,7 +23,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// The lists of a dataset with the given `dataset.json`, from the records of its poses in the order of the plan.
+    /// Builds the lists of a dataset with the given `dataset.json` from the records of its poses in the order of the plan.
     pub fn of<E>(
         limbs: &[LimbJobs],
         description: &str,

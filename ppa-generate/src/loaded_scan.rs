@@ -10,7 +10,7 @@ use crate::case::{Case, Found};
 use crate::gates::require_limb;
 use crate::prepared_limb::{PrepareError, PreparedLimb, towards_left};
 
-/// The scan of a case, from which its limb is prepared as often as decisions change.
+/// The scan of a case, from which its limb is prepared again whenever decisions change.
 pub struct LoadedScan {
     /// Hounsfield units in the `ct` frame.
     pub volume: Volume,
@@ -27,7 +27,7 @@ impl LoadedScan {
         Self::of_scan(scan, case)
     }
 
-    /// Takes a scan that was read as a case says.
+    /// Takes a scan that was read with the options of a case.
     ///
     /// # Errors
     /// [`PrepareError::OtherScan`] when it is not the one the case was made from.
@@ -43,7 +43,7 @@ impl LoadedScan {
         Ok(scan.into())
     }
 
-    /// Carries out the decisions of a case.
+    /// Prepares the limb of a case.
     ///
     /// # Errors
     /// [`PrepareError`] when the scan holds no limb or shows no landmarks.
@@ -52,7 +52,7 @@ impl LoadedScan {
         self.with_landmarks(Arc::new(limb), case.side, &case.surface, &case.choices)
     }
 
-    /// As [`Self::prepare`], faster: `limb` was extracted for another case with the same side and surface, and is kept.
+    /// Like [`Self::prepare`], but faster: reuses `limb`, which was extracted for another case with the same side and surface.
     ///
     /// # Errors
     /// [`PrepareError`] when its landmarks are not found.
@@ -64,7 +64,7 @@ impl LoadedScan {
         self.with_landmarks(limb, case.side, &case.surface, &case.choices)
     }
 
-    /// The limb alone, without landmarks.
+    /// Extracts the limb, without landmarks.
     ///
     /// # Errors
     /// [`PrepareError`] when the scan holds no limb.
@@ -74,11 +74,11 @@ impl LoadedScan {
         Ok(limb)
     }
 
-    /// As [`Self::extract`], with the body around `point` (`ct` frame, mm) kept as a part of the limb, or removed if it is kept; and the
-    /// points of [`LimbSettings::kept`] that say so.
+    /// Like [`Self::extract`], with the body around `point` (`ct` frame, mm) added to the limb, or removed if it was added; also returns
+    /// the points for [`LimbSettings::kept`].
     ///
     /// # Errors
-    /// [`PrepareError`] when the scan holds no limb, or the point is in no body beside it.
+    /// [`PrepareError`] when the scan holds no limb, or the point is in no other body.
     pub fn toggle_body(
         &self,
         side: Side,
@@ -108,7 +108,7 @@ impl LoadedScan {
     }
 }
 
-/// Settings that take the limb of that side where nothing else is wanted.
+/// Settings that select the limb on `side` by default.
 fn on_side(side: Side, surface: &LimbSettings) -> LimbSettings {
     LimbSettings {
         towards: surface.towards.or(Some([towards_left(side), 0.0, 0.0])),
@@ -126,7 +126,7 @@ impl From<Scan> for LoadedScan {
 }
 
 impl Found {
-    /// What was found of a limb.
+    /// Results of the preparation of a limb.
     pub fn of(prepared: &PreparedLimb) -> Self {
         Self {
             findings: prepared.findings.clone(),
@@ -137,7 +137,7 @@ impl Found {
 }
 
 impl PreparedLimb {
-    /// Carries out the decisions of a case.
+    /// Prepares the limb of a case.
     ///
     /// # Errors
     /// [`PrepareError`]; a scan other than the one the case was made from is refused.
@@ -145,10 +145,10 @@ impl PreparedLimb {
         LoadedScan::of_case(case)?.prepare(case)
     }
 
-    /// As [`PreparedLimb::of_case`], of a scan that was read as the case says.
+    /// Like [`PreparedLimb::of_case`], with a scan that was read with the options of the case.
     ///
     /// # Errors
-    /// As [`PreparedLimb::of_case`].
+    /// The same as [`PreparedLimb::of_case`].
     pub fn of_scan(scan: Scan, case: &Case) -> Result<Self, PrepareError> {
         LoadedScan::of_scan(scan, case)?.prepare(case)
     }

@@ -19,7 +19,7 @@ pub struct MadeImages {
     pub rois: RoiFile,
 }
 
-/// The images of a limb that are made so far in the dataset `root`, by the records of its poses; may run beside `generate`.
+/// Returns the images of a limb made so far in the dataset `root`, from the records of its poses; may run while `generate` does.
 ///
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset.

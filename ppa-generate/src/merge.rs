@@ -1,4 +1,4 @@
-//! Shards joined to one dataset: the same bytes as a run over the whole plan.
+//! Merges shards into one dataset: the same bytes as a run of the whole plan.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -26,20 +26,20 @@ use crate::record::{FoundRecord, PoseJob, Record};
 use crate::staging::staging_folder;
 use crate::write_archive::{NamedBytes, write_archive};
 
-/// Why shards could not be joined.
+/// Why shards could not be merged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MergeError {
-    /// A shard's folder.
+    /// The folder of a shard cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file of a shard.
+    /// A file of a shard cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
     /// The merged dataset.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// It was asked to stop.
+    /// The merge was asked to stop.
     #[error("the merge ended before its last pose")]
     Stopped(#[from] Stopped),
     /// No folder was given.
@@ -54,7 +54,7 @@ pub enum MergeError {
     /// A shard would be merged into itself.
     #[error("{} is one of the shards; merge them into another folder", .0.display())]
     IntoShard(PathBuf),
-    /// Shards that do not belong together.
+    /// Shards belong to different datasets.
     #[error("{} and {} belong to different datasets: {key} differs", first.display(), second.display())]
     OtherDataset {
         /// A shard.
@@ -74,12 +74,12 @@ pub enum MergeError {
         /// The pose.
         pose_job: String,
     },
-    /// Poses that no shard holds.
+    /// No shard holds some of the poses.
     #[error("no shard holds {pose_job}; {missing} of {} are missing", ppa_core::text::count(*pose_jobs, "pose"))]
     Hole {
-        /// The first of them.
+        /// The first missing pose.
         pose_job: String,
-        /// Their number.
+        /// Number of missing poses.
         missing: usize,
         /// Poses of the plan.
         pose_jobs: usize,
@@ -100,21 +100,20 @@ pub enum MergeError {
         /// The pose.
         pose_job: String,
     },
-    /// An image of a shard is not the one that was made.
+    /// An image of a shard was altered.
     #[error("{} is altered: its hash does not match the recorded one", .0.display())]
     Altered(PathBuf),
 }
 
-/// Joins the shards of one plan in the folder `root`, copying their images, or in the tar archive of this path if it ends in
-/// `.tar`. Shards may be folders and archives.
+/// Merges the shards of one plan into the folder `root`, copying their images, or into the tar archive of this path if it ends in `.tar`.
+/// Shards may be folders and archives.
 ///
-/// Every image is compared with its recorded hash before it is written. What is there already is
-/// kept, so a merge that was killed can be repeated; an archive is written whole or not at all. Another dataset in `root` is refused, or made this one where `replace` is
-/// set, as by [`generate`](crate::generate). Once `stop` is true no other pose begins.
+/// Every image is compared with its recorded hash before it is written. Existing poses are kept, so a killed merge can be repeated; an
+/// archive is written whole or not at all. Another dataset in `root` is refused, or replaced if `replace` is set, as by
+/// [`generate`](crate::generate). Once `stop` is true no other pose begins.
 ///
 /// # Errors
-/// [`MergeError`]; shards of different plans, overlaps and holes are refused before anything is
-/// written.
+/// [`MergeError`]; shards of different plans, overlaps and missing poses are refused before anything is written.
 pub fn merge(
     shards: &[PathBuf],
     root: &Path,
@@ -159,7 +158,7 @@ pub fn merge(
 struct Shards {
     planned: Planned,
     files: Vec<DatasetFiles>,
-    /// Which of them holds the record of a pose.
+    /// Index of the shard that holds the record of a pose.
     holder: HashMap<PoseId, usize>,
 }
 
@@ -173,8 +172,8 @@ impl Shards {
             if same_folder(folder, root) {
                 return Err(MergeError::IntoShard(root.to_owned()));
             }
-            // Refuses a shard that is written now. The lock is not kept, since there may be more shards than files may be open;
-            // a pose that changes later fails by its hash.
+            // Refuses a shard that is being written. The lock is not kept, since there may be more shards than files may be open; a pose
+            // that changes later fails its hash check.
             lock_existing(folder)?;
             let shard = DatasetFiles::open(folder)?;
             if shard.is_empty_archive() {
@@ -356,7 +355,7 @@ impl Shards {
     }
 }
 
-/// What an archive that exists holds.
+/// Content of an existing archive.
 enum Merged {
     /// The merged dataset.
     Whole(Vec<Record>),

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_xray::Projection;
 
-/// A joint (`ct` frame) whose shadow falls beside the detector.
+/// Finding that a joint (`ct` frame) is projected outside the detector.
 pub(crate) fn off_detector(projection: &Projection, joint: &Point3<f64>) -> Option<Finding> {
     let in_device = projection.ct_from_device.inverse() * joint;
     let magnification = projection.source_detector_mm / in_device.z;
@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn a_joint_is_reported_where_its_shadow_misses_the_detector() {
-        // Magnified by 2: 100 mm of the joint's plane to either side.
+        // Magnification 2: 100 mm of the joint's plane to either side.
         let detector = Detector::centred(40, 20, 10.0);
         let projection = Projection::new(Isometry3::identity(), 1000.0, detector);
         let beyond = |x, y| {

@@ -41,7 +41,7 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// Called before poses change: removes the lists, which would name images that are gone, and describes the run.
+    /// Removes the lists, which would name images that are gone, and describes the run; called before poses change.
     pub fn open(&self, limbs: &[LimbJobs]) -> Result<(), FileError> {
         let mut is_open = self.is_open.lock().unwrap_or_else(|e| e.into_inner());
         if *is_open {
@@ -53,7 +53,7 @@ impl<'a> Overview<'a> {
         files.insert(Findings::FILE.to_owned());
         files.remove(DESCRIPTION_FILE);
         files.remove(Manifest::FILE);
-        // Without the manifest the dataset is unfinished, so it goes first, and the hashes that vouch for the rest last.
+        // Without the manifest the dataset is unfinished, so it is removed first, and the hashes of the rest last.
         self.retire(Manifest::FILE, &covered)?;
         for file in &files {
             self.retire(file, &covered)?;
@@ -64,7 +64,7 @@ impl<'a> Overview<'a> {
         Ok(())
     }
 
-    /// Writes what the folder is to hold, so that its state is known from then on.
+    /// Writes the intended content of the folder, so that its state is known from then on.
     pub fn describe(&self) -> Result<(), FileError> {
         let part = part_text(self.part);
         self.renew(PART_FILE, part.as_deref(), || read_part(self.root).is_ok())?;
@@ -72,7 +72,7 @@ impl<'a> Overview<'a> {
         self.renew(DESCRIPTION_FILE, Some(self.description), is_whole)
     }
 
-    /// Brings a file to the given text; one that is damaged is set aside.
+    /// Updates a file to the given text; a damaged one is set aside.
     fn renew(
         &self,
         file: &str,
@@ -97,7 +97,7 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// Brings the lists to those of the records that are there now.
+    /// Updates the lists to the current records.
     pub fn close(&self, lists: &Lists) -> Result<(), FileError> {
         let differing: Vec<_> = lists
             .files
@@ -110,7 +110,7 @@ impl<'a> Overview<'a> {
         for file in earlier.filter(gone) {
             self.retire(file, &covered)?;
         }
-        // The manifest goes first and comes last.
+        // The manifest is removed first and written last.
         for (file, _) in differing.iter().rev() {
             match file.as_str() {
                 Checksums::FILE => self.retire_checksums(&covered)?,
@@ -143,13 +143,13 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// Notes files that are made again because they were missing or altered.
+    /// Records files that are made again because they were missing or altered.
     pub fn add_healed(&self, files: impl IntoIterator<Item = String>) {
         let mut healed = self.healed.lock().unwrap_or_else(|e| e.into_inner());
         healed.extend(files);
     }
 
-    /// All of them, in order.
+    /// All files that are made again, sorted.
     pub fn into_healed(self) -> Vec<String> {
         let mut healed = self.healed.into_inner().unwrap_or_else(|e| e.into_inner());
         healed.sort();

@@ -17,7 +17,7 @@ struct PartFile {
     part: String,
 }
 
-/// The text of the file; `None` where there is to be none.
+/// The text of the file; `None` for a whole plan.
 pub(crate) fn part_text(part: Part) -> Option<String> {
     let file = PartFile {
         part: part.to_string(),
@@ -26,7 +26,7 @@ pub(crate) fn part_text(part: Part) -> Option<String> {
     (part != Part::WHOLE).then(|| sealed(&text()))
 }
 
-/// The part that the folder of a begun dataset is to hold.
+/// Reads the part that the folder of a begun dataset should hold.
 pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
     let path = root.join(PART_FILE);
     let text = match ppa_core::regular_file::read_to_string(&path) {
@@ -36,7 +36,7 @@ pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
     part_of_text(&text, &path)
 }
 
-/// The part that a part file states, which was read from `path`.
+/// Parses a part file that was read from `path`.
 pub(crate) fn part_of_text(text: &str, path: &Path) -> Result<Part, FileError> {
     let part = match opened(text) {
         Opened::Sealed(text) => {

@@ -1,6 +1,6 @@
 //! The comments in a plan file: headings, meanings of keys, and settings that are off. A new key gets its line here.
 
-/// The first lines.
+/// Header of a plan file.
 pub(crate) const HEADER: &str = "\
 # Plan of a dataset: `ppa plan` estimates its cost, `ppa generate` generates it.
 # Every key is listed with its default; a line may be deleted. Lines that begin with # and no
@@ -9,7 +9,7 @@ pub(crate) const HEADER: &str = "\
 
 ";
 
-/// What a table is for; the key is its name in the file.
+/// Purpose of each table, by its name in the file.
 pub(crate) const TABLES: &[(&str, &str)] = &[
     ("[[case]]", "The limbs. Cases come from `ppa prepare`."),
     (
@@ -57,7 +57,7 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
     ("[xray.calibration]", ""),
 ];
 
-/// What a key means, by table and key.
+/// Meaning of each key, by table and key.
 pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     ("", "version", "format of this file"),
     ("", "seed", "of all random numbers"),
@@ -323,6 +323,6 @@ pub(crate) const OFF_TABLES: &str = "
 #multipath = { albedo = 0.5, modulation_mhz = 200 }
 ";
 
-/// What is written before the table of materials, which is long and rarely changed.
+/// Comment before the table of materials, which is long and rarely changed.
 pub(crate) const CALIBRATION: &str =
     "# HU to material and density, the built-in table: remove all # below to change it.\n";

@@ -11,9 +11,9 @@ use serde::Deserialize;
 use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::seal::{Opened, opened};
 
-/// Which poses a dataset is made of, and what they follow from.
+/// The planned poses of a dataset and the hashes of their inputs.
 pub(crate) struct Planned {
-    /// `dataset.json` as it stands.
+    /// The text of `dataset.json`.
     pub text: String,
     /// Whether its files carry hashes, which those of earlier versions did not.
     pub sealed: bool,
@@ -33,7 +33,7 @@ impl Planned {
         Self::of_text(read_text(&path)?, &path)
     }
 
-    /// The content of a `dataset.json`, which was read from `path`.
+    /// Parses a `dataset.json` that was read from `path`.
     pub fn of_text(text: String, path: &Path) -> Result<Self, FileError> {
         let seal = opened(&text);
         let planned: PlannedPoses =

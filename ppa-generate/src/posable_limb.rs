@@ -33,17 +33,17 @@ struct ShapedSkin {
     shape: BodyShape,
     mesh: Mesh,
     body: Body,
-    /// How much more it encloses than the skin of the scan; `None` for that itself.
+    /// Change of the enclosed volume against the skin of the scan; `None` for that skin.
     volume_change_mm3: Option<f64>,
 }
 
-/// What a pose is made of.
+/// The images of a pose, with regions of interest and findings.
 pub(crate) struct Images {
-    /// Its images, already written.
+    /// Rows of its images, which are already written.
     pub files: Vec<FileRow>,
     /// Regions of interest in them.
     pub rois: RoiFile,
-    /// Doubts about the limb and about this pose.
+    /// Findings about the limb and about this pose.
     pub findings: Vec<Finding>,
 }
 
@@ -96,7 +96,7 @@ impl<'a> PosableLimb<'a> {
         Ok(posable)
     }
 
-    /// Looks at all poses of the plan, before the first of them is made, and refuses those cut too much.
+    /// Computes the cuts of all poses of the plan before the first of them is made, and refuses a limb that is cut too much.
     fn checked_cuts(&self) -> Result<Vec<PoseCuts>, PoseError> {
         if self.cut_faces.is_empty() {
             return Ok(Vec::new());
@@ -107,7 +107,7 @@ impl<'a> PosableLimb<'a> {
         );
         let rigid = closed_skin(&walls.vertices(skin), skin, walls)?;
         let poses = self.plan.rotation.poses()?;
-        // A pose that cannot be made is reported with its angle when its turn comes.
+        // A pose that cannot be made is reported later, with its angle.
         let cuts: Vec<PoseCuts> = poses
             .par_iter()
             .filter_map(|&pose| self.pose_cuts(pose, &rigid).ok())
@@ -150,7 +150,7 @@ impl<'a> PosableLimb<'a> {
         self.limb.prepared.landmarks.joint_centre.into()
     }
 
-    /// Makes all images of one pose under `root`; `histories` keep those of an analog radiograph that is stopped.
+    /// Makes all images of one pose under `root`; `histories` keeps those of a stopped analog radiograph.
     pub(crate) fn make(
         &self,
         pose_job: &PoseJob,
@@ -160,7 +160,7 @@ impl<'a> PosableLimb<'a> {
         let pose = pose_job.pose;
         let mut files = Vec::new();
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
-        // The skin of the scan decides the pose of the radiograph and the regions of interest.
+        // The skin of the scan determines the pose of the radiograph and the regions of interest.
         let exposure = self.limb.pose(pose.angle_rad())?;
         let placement = exposure.placement;
         let cameras = self.setup.cameras.iter();
@@ -209,14 +209,14 @@ impl<'a> PosableLimb<'a> {
         })
     }
 
-    /// T^V_CT: through the patient and the room into the camera.
+    /// T^V_CT: from the scan through patient and room to the camera.
     fn camera_from_ct(&self, camera: &PlacedCamera, placement: &Placement) -> Isometry3<f64> {
         let room_from_ct =
             placement.room_from_patient * self.limb.prepared.landmarks.patient_from_ct();
         camera.camera_from_room * room_from_ct.isometry()
     }
 
-    /// A skin that the table flattens, in the room; `None` for a rigid one.
+    /// The skin flattened by the table, in the room; `None` for a rigid one.
     fn flattened(&self, skin: &Mesh, placement: &Placement) -> Result<Option<Body>, PoseError> {
         if placement.flattening.is_none() {
             return Ok(None);
@@ -226,7 +226,7 @@ impl<'a> PosableLimb<'a> {
         Ok(Some(closed_skin(&in_room, skin, walls)?))
     }
 
-    /// A skin before a camera: flattened in the room, or rigid in the scan.
+    /// A skin placed in the camera frame: flattened in the room, or rigid in the scan.
     fn placed<'b>(
         &self,
         camera: &PlacedCamera,

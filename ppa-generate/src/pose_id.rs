@@ -13,7 +13,7 @@ pub(crate) const FOLDER: &str = ".ppa";
 pub(crate) struct PoseId {
     /// The limb.
     pub limb: LimbId,
-    /// Half degrees of medial rotation.
+    /// Medial rotation in half degrees.
     pub step: u32,
 }
 
@@ -24,7 +24,7 @@ impl fmt::Display for PoseId {
 }
 
 impl PoseId {
-    /// The pose of a name as [`LimbId::unit_name`] makes it.
+    /// Parses a name in the form of [`LimbId::unit_name`].
     pub fn of_unit_name(name: &str) -> Option<Self> {
         let mut parts = name.strip_prefix("patient_")?.split('_');
         let (patient, side, step) = (parts.next()?, parts.next()?, parts.next()?);
@@ -38,7 +38,7 @@ impl PoseId {
         (pose.limb.unit_name(pose.step) == name).then_some(pose)
     }
 
-    /// Where images of it may lie: depth images of all body shapes and cameras, then its radiograph.
+    /// Possible paths of its images: depth images of all body shapes and cameras, then its radiograph.
     pub fn images(self) -> Vec<String> {
         let Self { limb, step } = self;
         let depth = BodyShape::ALL

@@ -13,8 +13,8 @@ use crate::prepared_limb::{PrepareError, PreparedLimb};
 
 /// Proposes a case for one limb of the scan at `path`, read with the options `reading`.
 ///
-/// Given `surface` and `choices` are kept; what they leave open is found. Of two limbs side by side the one on `side` of the patient is taken, and a
-/// warning says so; a warning is also given when the image shows too little of that limb.
+/// Given `surface` and `choices` are kept; the rest is found. Of two limbs side by side the one on `side` of the patient is selected, with
+/// a warning; a warning is also given if the image shows too little of that limb.
 ///
 /// # Errors
 /// [`PrepareError`] when the scan is unreadable, holds no limb, or shows no landmarks.
@@ -35,10 +35,10 @@ pub fn prepare(
     )
 }
 
-/// As [`prepare`], of a scan that was read from `path` with `reading`.
+/// Like [`prepare`], with a scan that was read from `path` with `reading`.
 ///
 /// # Errors
-/// As [`prepare`].
+/// The same as [`prepare`].
 pub fn prepare_scan(
     scan: Scan,
     path: &Path,
@@ -77,7 +77,7 @@ pub fn prepare_scan(
     Ok((case, prepared))
 }
 
-/// The number of the series that was read, unless it has none or shares it; its UID stays out of the case.
+/// Number of the series that was read; `None` if it has none or shares it. Its UID stays out of the case.
 fn number_of_its_own(scan: &Scan) -> Option<i32> {
     let number = scan.series.iter().find(|series| series.read)?.number?;
     let sharing = scan.series.iter().filter(|s| s.number == Some(number));

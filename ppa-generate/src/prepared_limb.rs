@@ -18,16 +18,16 @@ pub enum PrepareError {
     /// The scan cannot be read.
     #[error(transparent)]
     Read(#[from] ppa_ct::ReadError),
-    /// A chosen series that a case cannot name: cases hold no UID.
+    /// The chosen series cannot be named in a case, which holds no UID.
     #[error("the chosen series in {} has no unique number; put its files into a separate folder", .0.display())]
     SeriesWithoutNumber(PathBuf),
-    /// No limb was found in it.
+    /// No limb was found in the scan.
     #[error(transparent)]
     Limb(#[from] ppa_mesh::LimbError),
-    /// What was found is far too small for one.
+    /// What was found is far too small for a limb.
     #[error(transparent)]
     NotALimb(#[from] NotALimb),
-    /// Its landmarks were not found.
+    /// The landmarks of the limb were not found.
     #[error(transparent)]
     Landmarks(#[from] ppa_scene::LandmarkError),
     /// The scan is not the one the case was made from.
@@ -54,7 +54,7 @@ pub struct PreparedLimb {
     pub limb: Arc<Limb>,
     /// Axis, joint and plane.
     pub landmarks: Landmarks,
-    /// Doubts about scan and limb, severe ones first.
+    /// Findings about scan and limb, severe ones first.
     pub findings: Vec<Finding>,
 }
 
@@ -122,11 +122,10 @@ pub(crate) fn towards_left(side: Side) -> f64 {
     }
 }
 
-/// A body with bone that holds at least this much of the limb's solid volume may be the limb that was meant.
+/// A body with bone and at least this share of the limb's solid volume may be the intended limb.
 const LEAST_OF_LIMB: f64 = 0.1;
 
-/// That beside the limb, on the side which was asked for, another one lies of which the scan shows too little to be
-/// taken; nothing when a person said where the limb is.
+/// Finding that another limb is on the requested side, but cut off too much to be selected; `None` if a person selected the limb.
 fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Option<Finding> {
     if settings.inside.is_some() || settings.towards.is_some() {
         return None;
@@ -158,7 +157,7 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
     })
 }
 
-/// That the limb is more than was found.
+/// Finding that bodies were added to the limb.
 fn bodies_kept(report: &LimbReport) -> Option<Finding> {
     let kept = report.bodies.iter().filter(|body| !body.kept.is_empty());
     let largest = kept.clone().next()?;
@@ -176,7 +175,7 @@ fn bodies_kept(report: &LimbReport) -> Option<Finding> {
     })
 }
 
-/// That something was cut off.
+/// Finding that parts of the limb were removed.
 fn part_removed(report: &LimbReport, settings: &LimbSettings) -> Option<Finding> {
     let balls = settings.removed.iter();
     let largest = balls.max_by(|a, b| a.radius_mm.total_cmp(&b.radius_mm))?;
@@ -194,7 +193,7 @@ fn part_removed(report: &LimbReport, settings: &LimbSettings) -> Option<Finding>
     })
 }
 
-/// Which of several limbs was taken.
+/// Finding that states which of several limbs was selected.
 fn several_limbs(report: &LimbReport) -> Option<Finding> {
     let alike = report.bodies.iter().filter(|body| body.alike).count();
     let chosen = report.bodies.iter().find(|body| body.chosen)?;

@@ -1,4 +1,4 @@
-//! The exposure of a posed limb: its voxels around the central beam, and the device as the scan sees it.
+//! The exposure of a posed limb: its voxels around the central beam, and the device in the frame of the scan.
 
 use nalgebra::{Point3, Unit, Vector3};
 use ppa_ct::Volume;
@@ -10,7 +10,7 @@ use crate::prepared_limb::PreparedLimb;
 
 const AIR_HU: f32 = -1000.0;
 
-/// Why the joint cannot be turned into voxels of material and density.
+/// Why the joint cannot be converted to voxels of material and density.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JointError {
@@ -19,13 +19,13 @@ pub enum JointError {
         "no voxel of the limb lies within {half_length_mm} mm of the central beam along the limb's axis"
     )]
     NoLimb {
-        /// Half the length that was looked at.
+        /// Half the length that was searched, mm.
         half_length_mm: f64,
     },
-    /// The cropped scan.
+    /// The scan cannot be cropped.
     #[error(transparent)]
     Volume(#[from] ppa_ct::VolumeError),
-    /// Materials and densities.
+    /// Materials and densities cannot be assigned.
     #[error(transparent)]
     Phantom(#[from] ppa_xray::PhantomError),
 }
@@ -74,7 +74,7 @@ fn limb_phantom(
 
 /// The limb around the central beam as voxels of material and density, ready for exposures in any rotation.
 ///
-/// Of the plan, the shift of the beam along the limb, voxels, interpolation, calibration, form factors and Compton model count.
+/// The result depends on the plan's shift of the beam along the limb, voxels, interpolation, calibration, form factors and Compton model.
 ///
 /// # Errors
 /// [`JointError`] when there is no limb near the beam or the HU calibration is unusable.
@@ -87,7 +87,7 @@ pub fn prepared_phantom(
     Ok(PreparedPhantom::new(voxels, plan.xray.engine.compton_model))
 }
 
-/// The exposure of a placed limb: the device moves into the scan, the voxels stay.
+/// The projection of a placed limb: the device is moved into the frame of the scan, the voxels stay.
 pub fn projection(
     placement: &Placement,
     landmarks: &Landmarks,

@@ -23,12 +23,12 @@ pub(crate) struct PoseJob<'a> {
     pub limb: LimbId,
     /// Its rotation.
     pub pose: PoseAngle,
-    /// Hash of everything the limb's images follow from, but the pose.
+    /// Hash of everything that determines the limb's images, except the pose.
     pub limb_key: &'a str,
 }
 
 impl PoseJob<'_> {
-    /// Which pose it is.
+    /// Identity of the pose.
     pub fn id(&self) -> PoseId {
         PoseId {
             limb: self.limb,
@@ -36,7 +36,7 @@ impl PoseJob<'_> {
         }
     }
 
-    /// Hash of everything its images follow from.
+    /// Hash of everything that determines its images.
     pub fn key(&self) -> String {
         let address = format!("{}/{}", self.limb_key, self.pose.step);
         hex(&Sha256::digest(address.as_bytes()))
@@ -49,7 +49,7 @@ impl fmt::Display for PoseJob<'_> {
     }
 }
 
-/// The poses whose records stand in a folder, in order.
+/// The poses with records in a folder, in order.
 pub(crate) fn record_names(folder: &Path) -> Result<Vec<PoseId>, FileError> {
     let names = fs::read_dir(folder).and_then(|entries| {
         let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
@@ -64,29 +64,29 @@ pub(crate) fn record_names(folder: &Path) -> Result<Vec<PoseId>, FileError> {
     Ok(poses)
 }
 
-/// A finished pose: put in its place after all its files, so its presence proves them.
+/// Record of a finished pose: put in its place after all its files, so that its presence proves theirs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Record {
-    /// Hash of everything the pose's bytes follow from.
+    /// Hash of everything that determines the pose's bytes.
     pub key: String,
     /// Its images.
     pub files: Vec<FileRow>,
     /// Its regions of interest.
     pub rois: RoiFile,
-    /// Doubts about the limb and about this pose.
+    /// Findings about the limb and about this pose.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
 }
 
-/// What stands in the place of a record.
+/// Content of a record's file.
 #[derive(Debug)]
 pub(crate) enum FoundRecord {
-    /// Nothing.
+    /// There is no file.
     Absent,
-    /// A record whose seal fits, or one of an earlier version, which had none.
+    /// A record with a valid seal, or one of an earlier version, which had none.
     Whole(Record),
-    /// A file that is not a record of this pose, or not as it was written.
+    /// A file that is not a record of this pose, or was altered.
     Damaged,
 }
 
@@ -101,7 +101,7 @@ impl FoundRecord {
 }
 
 impl Record {
-    /// Reads what stands in the file of a pose's record.
+    /// Reads the file of a pose's record.
     pub fn look(path: &Path, pose: PoseId) -> Result<FoundRecord, FileError> {
         match ppa_core::regular_file::read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(FoundRecord::Absent),
@@ -110,14 +110,14 @@ impl Record {
         }
     }
 
-    /// What the bytes in the file of a pose's record are.
+    /// Parses the bytes of a pose's record file.
     pub fn of_bytes(bytes: Vec<u8>, pose: PoseId) -> FoundRecord {
         let text = String::from_utf8(bytes).ok();
         let record = text.and_then(|text| Self::parse(&text, pose));
         record.map_or(FoundRecord::Damaged, FoundRecord::Whole)
     }
 
-    /// The record in a text, when it is as it was written and of the given pose.
+    /// The record in a text, if it is unaltered and of the given pose.
     fn parse(text: &str, pose: PoseId) -> Option<Self> {
         let record: Self = match opened(text) {
             Opened::Sealed(text) => serde_json::from_str(&text).ok()?,
@@ -172,7 +172,7 @@ impl Record {
         self.files.iter().map(size).sum()
     }
 
-    /// Bytes of those of its images that are there.
+    /// Bytes of its images that exist.
     pub fn size_of_rest(&self, root: &Path) -> u64 {
         let size =
             |row: &FileRow| fs::metadata(root.join(&row.file)).map_or(0, |found| found.len());

@@ -23,25 +23,25 @@ use crate::seed::{Purpose, plan_seed};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneSetupError {
-    /// The room.
+    /// The room cannot be used.
     #[error(transparent)]
     Room(#[from] RoomError),
-    /// The pose of the device in a recorded room.
+    /// The pose of the device in a recorded room is invalid.
     #[error("room.room_from_device of the plan")]
     DevicePose(#[from] ppa_depth::RigidError),
-    /// Points of a recorded room.
+    /// The points of a recorded room cannot be used.
     #[error(transparent)]
     Cloud(#[from] CloudError),
-    /// Its table.
+    /// The table of the room was not found.
     #[error(transparent)]
     Table(#[from] ppa_scene::PlaneError),
-    /// The camera rig.
+    /// The camera rig cannot be used.
     #[error(transparent)]
     Rig(#[from] RigError),
-    /// The errors of the cameras' sensors.
+    /// The errors of the cameras' sensors are invalid.
     #[error("depth.sensor of the plan")]
     Sensor(#[from] SensorError),
-    /// Points or triangles of a recorded room that cannot be rendered.
+    /// Points or triangles of a recorded room cannot be rendered.
     #[error("{}", path.display())]
     RoomFile {
         /// The file.
@@ -49,15 +49,15 @@ pub enum SceneSetupError {
         /// What is wrong.
         source: Box<SceneSetupError>,
     },
-    /// Furniture that cannot be rendered.
+    /// The furniture cannot be rendered.
     #[error(transparent)]
     Body(#[from] ppa_depth::BodyError),
-    /// The x-ray beam.
+    /// The x-ray beam cannot be computed.
     #[error(transparent)]
     Spectrum(#[from] ppa_xray::SpectrumError),
 }
 
-/// A camera in its place, with the empty room as it sees it.
+/// A placed camera with its view of the empty room.
 pub struct PlacedCamera {
     /// Left or right.
     pub view: View,
@@ -67,12 +67,12 @@ pub struct PlacedCamera {
     pub camera_from_room: Isometry3<f64>,
     /// Depth image of the room without the limb; rendered once, since nothing in it moves.
     pub background: DepthImage,
-    /// The sensor, if it is not ideal, and the empty room as it needs it.
+    /// The sensor, if it is not ideal, and its view of the empty room.
     pub sensor: Option<(Sensor, Backdrop)>,
 }
 
 impl PlacedCamera {
-    /// A camera before the furniture of a room.
+    /// Creates a camera with its view of the furniture of a room.
     pub fn new(
         view: View,
         camera: Camera,
@@ -99,7 +99,7 @@ impl PlacedCamera {
     }
 }
 
-/// Room, table and x-ray device: all that placing a limb needs.
+/// Room, table and x-ray device: everything needed to place a limb.
 pub struct Table {
     /// The room with its furniture and device.
     pub room: XrayRoom,
@@ -121,7 +121,7 @@ impl Table {
         Ok(Self { room, plane })
     }
 
-    /// Lays a skin (`ct` frame) on the table, turned medially by an angle in radians.
+    /// Lays a skin (`ct` frame) on the table, rotated medially by an angle in radians.
     ///
     /// # Errors
     /// [`PlaceError`] when the limb does not rest there.
@@ -143,14 +143,14 @@ impl Table {
         )
     }
 
-    /// From the source to the table top along the central beam, mm.
+    /// Distance from the source to the table top along the central beam, mm.
     pub fn source_table_mm(&self) -> f64 {
         let (device, plane) = (&self.room.device, &self.plane.plane);
         let above_mm = plane.normal.dot(&device.source().coords) - plane.offset_mm;
         -above_mm / plane.normal.dot(&device.beam_direction())
     }
 
-    /// What stands in the room, for the cameras: its triangles, or discs at its points.
+    /// The furniture of the room for the cameras: its triangles, or discs at its points.
     ///
     /// # Errors
     /// [`SceneSetupError`] for points whose normals cannot be found or that cannot be rendered.
@@ -162,7 +162,7 @@ impl Table {
     }
 }
 
-/// What a mesh file holds, for the cameras: its triangles, or discs at the points of a cloud.
+/// The contents of a mesh file for the cameras: its triangles, or discs at the points of a cloud.
 ///
 /// # Errors
 /// [`SceneSetupError`] for points or triangles that cannot be rendered.
@@ -191,7 +191,7 @@ pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, SceneSetupError> {
     Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
 }
 
-/// Everything that is fixed while the limb turns.
+/// Everything that is fixed while the limb rotates.
 pub struct SceneSetup {
     /// Room, table and device.
     pub table: Arc<Table>,
@@ -228,7 +228,7 @@ impl SceneSetup {
     }
 }
 
-/// The cameras of a plan before the furniture of a room, left first.
+/// The cameras of a plan with their views of the furniture, left first.
 fn place_cameras(table: &Table, plan: &Plan) -> Result<Vec<PlacedCamera>, SceneSetupError> {
     let rig = plan.depth.cameras()?;
     let furniture = match (table.furniture(), &plan.room.ply) {
@@ -249,7 +249,7 @@ fn place_cameras(table: &Table, plan: &Plan) -> Result<Vec<PlacedCamera>, SceneS
             .map_err(|source| RigError::Pose { side, source })?;
         let room_from_camera = device.room_from_device.isometry() * device_from_camera;
         let sensor = plan.depth.sensor.clone().map(|spec| {
-            // Both cameras have errors of their own.
+            // Each camera has its own errors.
             let seed = plan_seed(plan.seed, Purpose::DepthSensor).wrapping_add(view as u64);
             Sensor::new(spec, seed)
         });

@@ -4,10 +4,10 @@ use sha2::{Digest, Sha256};
 
 use ppa_dataset::files::hex;
 
-/// What separates an object from its seal. No JSON string holds a line break, so it stands nowhere else.
+/// Separates an object from its seal. No JSON string holds a line break, so it occurs nowhere else.
 const MARK: &str = ",\n\"seal\": \"";
 
-/// A JSON object with a last key `seal`: the SHA-256 of the text before it.
+/// Adds a last key `seal` to a JSON object: the SHA-256 of the text before it.
 ///
 /// # Panics
 /// When `object` is not the text of a JSON object with at least one key.
@@ -18,14 +18,14 @@ pub(crate) fn sealed(object: &str) -> String {
     format!("{head}{MARK}{}\"}}", hash(head))
 }
 
-/// What a text says about itself.
+/// Result of checking the seal of a text.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Opened {
-    /// The object without its seal, which fits.
+    /// The object without its seal, which is valid.
     Sealed(String),
     /// A text without a seal.
     Unsealed,
-    /// A seal that does not fit the text.
+    /// A seal that does not match the text.
     Broken,
 }
 

@@ -13,7 +13,7 @@ pub enum Purpose {
     Bumps,
     /// Photon histories and quantum noise of a radiograph; item = step.
     Radiograph,
-    /// Errors that stay with a depth camera.
+    /// Fixed errors of a depth camera.
     DepthSensor,
     /// Noise of depth images; item = step.
     DepthNoise,

@@ -9,7 +9,7 @@ use ppa_dataset::files::{FileError, write_whole};
 
 use crate::pose_id::FOLDER;
 
-/// Keeps the files of one dataset that no record vouches for.
+/// Keeps the files of one dataset that are in no record.
 pub(crate) struct SetAside<'a> {
     root: &'a Path,
     kept: Mutex<Vec<String>>,
@@ -21,8 +21,7 @@ impl<'a> SetAside<'a> {
         Self { root, kept }
     }
 
-    /// Moves a file, given by its path from the root, to the same path below `.ppa/altered`; a number is added where
-    /// something stands there already.
+    /// Moves a file, given by its path from the root, to the same path below `.ppa/altered`; a number is added if that path exists.
     pub fn keep(&self, file: &str) -> Result<(), FileError> {
         let folder = format!("{FOLDER}/altered");
         let mut to = format!("{folder}/{file}");
@@ -36,7 +35,7 @@ impl<'a> SetAside<'a> {
         Ok(())
     }
 
-    /// Where the files lie now, as paths from the root.
+    /// New paths of the files, from the root.
     pub fn into_kept(self) -> Vec<String> {
         let mut kept = self.kept.into_inner().unwrap_or_else(|e| e.into_inner());
         kept.sort();
@@ -44,7 +43,7 @@ impl<'a> SetAside<'a> {
     }
 }
 
-/// Moves a file, over one that may be there, into a folder that may not be there yet.
+/// Moves a file, replacing an existing one and creating the folder if needed.
 pub(crate) fn move_file(from: &Path, to: &Path) -> Result<(), FileError> {
     let folder = to.parent().map_or_else(PathBuf::new, Path::to_owned);
     fs::create_dir_all(&folder).map_err(FileError::at("create folder", &folder))?;

@@ -4,19 +4,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-/// Preparing a limb and its poses leaves threads beyond about this number idle for most of the time.
+/// Number of threads that preparing a limb and its poses keeps busy; more would be idle most of the time.
 const THREADS_PER_LIMB: usize = 4;
 
-/// Limbs in progress at a time. Each needs the memory of a prepared limb, so there are no more than keep the threads busy.
+/// Limbs in progress at a time. Each needs the memory of a prepared limb, so only as many as keep the threads busy.
 pub(crate) fn limbs_at_once() -> usize {
     rayon::current_num_threads().div_ceil(THREADS_PER_LIMB)
 }
 
-/// The results of `work` for each limb and its index, in the order of the limbs, with up to [`limbs_at_once`] in progress. They begin in
-/// order, and none begins after one has failed.
+/// Returns the results of `work` for each limb and its index, in the order of the limbs, with up to [`limbs_at_once`] in progress. Limbs
+/// begin in order, and none begins after one has failed.
 ///
 /// # Errors
-/// One of those of `work`.
+/// One of the errors of `work`.
 pub(crate) fn for_each_limb<T: Sync, R: Send, E: Send>(
     limbs: &[T],
     work: impl Fn(usize, &T) -> Result<R, E> + Sync,

@@ -1,8 +1,8 @@
-//! Files put into a dataset whole: made in `.ppa/new`, then moved to their place.
+//! Complete files for a dataset: made in `.ppa/new`, then moved into place.
 //!
-//! A pose has many files, so a run may be killed between two moves. Its new record is therefore written to `.ppa/new`
-//! before the first move and becomes the record after the last: the next run completes what it finds there. Until then
-//! the files of an earlier record stay as they are.
+//! A pose has many files, so a run may be killed between two moves. Its new record is therefore written to `.ppa/new` before the first move
+//! and moved into place after the last: the next run completes the poses that it finds there. Until then the files of an earlier record
+//! stay as they are.
 
 use std::fs;
 use std::io;
@@ -16,17 +16,17 @@ use crate::pose_id::FOLDER;
 use crate::record::{FoundRecord, Record, record_names};
 use crate::set_aside::{SetAside, move_file};
 
-/// Where a run makes images, below the same paths as in the dataset.
+/// Folder in which a run makes images, under the same paths as in the dataset.
 pub(crate) fn staging_folder(root: &Path) -> PathBuf {
     root.join(FOLDER).join("new")
 }
 
-/// Whether a run was killed while it put the files of a pose in their place.
+/// Whether a run was killed while it moved the files of a pose into place.
 pub(crate) fn is_interrupted(root: &Path, pose: PoseId) -> bool {
     staging_folder(root).join(pose.record_name()).exists()
 }
 
-/// The staging folder of a dataset that is claimed for writing.
+/// The staging folder of a dataset that is locked for writing.
 pub(crate) struct Staging<'a> {
     root: &'a Path,
     folder: PathBuf,
@@ -42,7 +42,7 @@ impl<'a> Staging<'a> {
         }
     }
 
-    /// Completes the poses that a killed run was putting in their place, and removes what else it left here.
+    /// Completes the poses that a killed run was moving into place, and removes everything else that it left here.
     pub fn recover(&self) -> Result<(), FileError> {
         if !self.folder.exists() {
             return Ok(());
@@ -58,7 +58,7 @@ impl<'a> Staging<'a> {
         self.clear()
     }
 
-    /// Removes the images of a pose that cannot be completed, as one of them is lost.
+    /// Removes the images of a pose that cannot be completed, since one of them is lost.
     fn withdraw(&self, pose: PoseId, record: &Record) -> Result<(), FileError> {
         let earlier = Record::look(&self.root.join(pose.record_file()), pose)?;
         for row in &record.files {
@@ -72,7 +72,7 @@ impl<'a> Staging<'a> {
         Ok(())
     }
 
-    /// Whether each image of a record lies here or in its place.
+    /// Whether each image of a record is here or in its place.
     fn has_all(&self, record: &Record) -> bool {
         record.files.iter().all(|row| {
             let here = |folder: &Path| {
@@ -82,8 +82,8 @@ impl<'a> Staging<'a> {
         })
     }
 
-    /// Puts the images of a pose, which were made here, and its record in their place. Images of the earlier record go;
-    /// other files that stand there are set aside.
+    /// Moves the images of a pose, which were made here, and its record into place. Images of the earlier record are removed; other files
+    /// there are set aside.
     pub fn put(&self, pose: PoseId, record: &Record) -> Result<(), FileError> {
         let intent = self.folder.join(pose.record_name());
         write_whole(&intent, record.to_text().as_bytes())?;
@@ -105,7 +105,7 @@ impl<'a> Staging<'a> {
         move_file(&intent, &self.root.join(pose.record_file()))
     }
 
-    /// Removes a pose whose record is there, with its images.
+    /// Removes a recorded pose with its images.
     pub fn remove(&self, pose: PoseId) -> Result<(), FileError> {
         match self.cleared(pose, None)? {
             FoundRecord::Damaged => self.aside.keep(&pose.record_file())?,
@@ -117,7 +117,7 @@ impl<'a> Staging<'a> {
         Ok(())
     }
 
-    /// Clears the place of a pose's images, but for those that are already as in `next`. Returns the earlier record.
+    /// Clears the place of a pose's images, except those that already match `next`. Returns the earlier record.
     fn cleared(&self, pose: PoseId, next: Option<&Record>) -> Result<FoundRecord, FileError> {
         let earlier = Record::look(&self.root.join(pose.record_file()), pose)?;
         for file in pose.images() {
@@ -146,7 +146,7 @@ impl<'a> Staging<'a> {
         move_file(&staged, &self.root.join(file))
     }
 
-    /// Removes a list that has the given hash; sets it aside, and returns `true`, where it has another one.
+    /// Removes a list that has the given hash; if it has another one, sets it aside and returns `true`.
     pub fn retire(&self, file: &str, hash: Option<&str>) -> Result<bool, FileError> {
         let path = self.root.join(file);
         match hash_if_there(&path)? {
@@ -156,7 +156,7 @@ impl<'a> Staging<'a> {
         }
     }
 
-    /// Removes the folders above a file that hold nothing any more.
+    /// Removes the empty folders above a file.
     pub fn remove_empty_folders(&self, file: &str) {
         let above = Path::new(file).ancestors().skip(1);
         for folder in above.filter(|folder| !folder.as_os_str().is_empty()) {
@@ -173,7 +173,7 @@ impl<'a> Staging<'a> {
         files.try_for_each(|row| remove_if_there(&self.folder.join(&row.file)))
     }
 
-    /// Removes the folder.
+    /// Removes the staging folder.
     pub fn clear(&self) -> Result<(), FileError> {
         match fs::remove_dir_all(&self.folder) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
@@ -184,7 +184,7 @@ impl<'a> Staging<'a> {
     }
 }
 
-/// Hash of a file; `None` where there is none.
+/// Hash of a file; `None` if there is none.
 fn hash_if_there(path: &Path) -> Result<Option<String>, FileError> {
     match sha256_of_file(path) {
         Err(error) if error.source.kind() == io::ErrorKind::NotFound => Ok(None),

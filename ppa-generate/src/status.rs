@@ -11,29 +11,29 @@ use crate::dataset_lock::{FolderError, lock_existing};
 use crate::limb_jobs::LimbJobs;
 use crate::record::FoundRecord;
 
-/// State of a dataset, by its records; its images are not read (see [`crate::check`]).
+/// State of a dataset, from its records; its images are not read (see [`crate::check`]).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Status {
-    /// Which part of its plan the folder is to hold, as `2/8`.
+    /// Part of its plan that the folder should hold, such as `2/8`.
     pub part: String,
-    /// Poses that it is to hold.
+    /// Poses that the folder should hold.
     #[serde(rename = "units")]
     pub pose_jobs: usize,
-    /// Poses that are made.
+    /// Finished poses.
     pub made: usize,
     /// Images of these poses.
     pub images: usize,
     /// Bytes of these images.
     pub bytes: u64,
-    /// Whether a process writes into the folder now.
+    /// Whether a process is writing to the folder.
     pub running: bool,
     /// Whether all poses are made and listed in the manifest.
     pub complete: bool,
-    /// Doubts about limbs and poses.
+    /// Number of findings about limbs and poses.
     pub findings: usize,
-    /// Those of them that are severe and not acknowledged.
+    /// Number of severe findings that are not acknowledged.
     pub open_findings: usize,
-    /// The same, limb by limb.
+    /// State of each limb.
     pub limbs: Vec<LimbStatus>,
 }
 
@@ -43,14 +43,14 @@ pub struct LimbStatus {
     /// The limb.
     #[serde(flatten)]
     pub limb: LimbId,
-    /// Poses that the folder is to hold.
+    /// Poses that the folder should hold.
     #[serde(rename = "units")]
     pub pose_jobs: usize,
-    /// Poses that are made.
+    /// Finished poses.
     pub made: usize,
 }
 
-/// Returns the generation progress of the dataset in `root`; changes nothing and may run beside `generate`.
+/// Returns the generation progress of the dataset in `root`; changes nothing and may run while `generate` does.
 ///
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset.

@@ -1,4 +1,4 @@
-//! Comparison of a folder's content with what a run would make in it.
+//! Comparison of a folder's content with the planned poses of a run.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
@@ -17,20 +17,20 @@ use crate::limb_jobs::LimbJobs;
 use crate::pose_id::FOLDER;
 use crate::record::{Record, record_names};
 
-/// A dataset of other settings, poses or images than those of a run into its folder.
+/// A folder holds a dataset of other settings, poses or images than those of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DatasetDiffers {
     /// The dataset's folder.
     pub root: PathBuf,
     /// Poses that it holds.
     pub poses: usize,
-    /// Of these, the ones that follow from other settings, scans or sources.
+    /// Of these, the ones made from other settings, scans or sources.
     pub stale: usize,
-    /// In which keys of `dataset.json` the run differs, what matters most first.
+    /// Keys of `dataset.json` in which the run differs, most important first.
     pub keys: Vec<KeyDifference>,
-    /// Of the poses in the folder, the ones that the run does not have: the first in words, and their number.
+    /// Poses in the folder that are not in the run: the first in words, and their number.
     pub beyond: Option<(String, usize)>,
-    /// Images in the place of those of the run that no record lists: the first, and their number.
+    /// Images at paths of the run that no record lists: the first, and their number.
     pub unrecorded: Option<(String, usize)>,
 }
 
@@ -86,12 +86,12 @@ fn are(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
-/// What stands in a folder that a run is to fill.
+/// Content of a folder that a run is to fill.
 pub(crate) struct Survey {
     poses: usize,
     /// Poses of the run whose record has another key.
     pub stale: HashSet<PoseId>,
-    /// Recorded poses that the run does not have, in the order of their names.
+    /// Recorded poses that are not in the run, in the order of their names.
     pub beyond: Vec<PoseId>,
     unrecorded: Vec<String>,
 }
@@ -130,7 +130,7 @@ impl Survey {
         })
     }
 
-    /// How the folder differs from a run with the given `dataset.json`; `None` where the run would only add to it.
+    /// How the folder differs from a run with the given `dataset.json`; `None` if the run would only add to it.
     pub fn differs(&self, root: &Path, description: &str) -> Option<DatasetDiffers> {
         let same = self.stale.is_empty() && self.beyond.is_empty() && self.unrecorded.is_empty();
         let there = || fs::read_to_string(root.join(DESCRIPTION_FILE)).unwrap_or_default();
@@ -156,7 +156,7 @@ impl Survey {
     }
 }
 
-/// Images that stand in the place of planned ones without a record.
+/// Images at paths of planned ones, without a record.
 fn unrecorded(
     root: &Path,
     limbs: &[LimbJobs],

@@ -20,9 +20,9 @@ use crate::plan::{MarkerPlace, XraySettings};
 /// | wrist | Wrist (PA view) | 50 to 60 | 3 to 5 |
 /// | elbow | Elbow (AP view) | 50 to 60 | 2 to 5 |
 ///
-/// Filtration is the least that IEC 60601-1-3 allows. The field is 180 mm wide and along the limb as long as the detectors named there, 220 mm
-/// for ankle and knee. The letter of the side lies in its upper corner, beside the fibula of a leg. The detector is 0.6 mm of caesium
-/// iodide with pixels of 0.148 mm, as flat panels of 43 cm have them, without the rows outside the field.
+/// Filtration is the least that IEC 60601-1-3 allows. The field is 180 mm wide and along the limb as long as the detectors named there, 220
+/// mm for ankle and knee. The side marker is in its upper corner, next to the fibula of a leg. The detector is 0.6 mm of caesium iodide
+/// with pixels of 0.148 mm, as flat panels of 43 cm have them, without the rows outside the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Technique {
     /// Ankle and hindfoot.
@@ -45,7 +45,7 @@ pub enum Technique {
 struct Factors {
     kvp: f64,
     mas: f64,
-    /// Along the limb.
+    /// Length of the field along the limb.
     field_length_mm: f64,
 }
 
@@ -58,7 +58,7 @@ fn rows(length_mm: f64) -> u32 {
 }
 
 impl Technique {
-    /// All of them, with their names.
+    /// All techniques, with their names.
     pub const ALL: [(&'static str, Self); 7] = [
         ("ankle", Self::Ankle),
         ("knee", Self::Knee),

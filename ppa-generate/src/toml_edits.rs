@@ -2,7 +2,7 @@
 
 use toml_edit::{DocumentMut, Item, TableLike, TomlError};
 
-/// `text` with the keys and values of `keys`: comments stay beside keys that stay.
+/// Returns `text` with the keys and values of `keys`; keys that stay keep their comments.
 pub(crate) fn with_keys(text: &str, keys: &str) -> Result<String, TomlError> {
     let mut edited: DocumentMut = text.parse()?;
     let keys: DocumentMut = keys.parse()?;

@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use ppa_dataset::files::FileError;
 
-/// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8.
+/// Serialises the content of a file at `path` as TOML; refuses paths that are not UTF-8.
 pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, FileError> {
     toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))
 }
 
-/// The format version of a TOML file, if it is not 1; its other keys may then be any.
+/// The format version of a TOML file, if it is not 1; its other keys are ignored.
 pub(crate) fn other_version(text: &str) -> Option<u32> {
     #[derive(serde::Deserialize)]
     struct Versioned {
@@ -22,8 +22,8 @@ pub(crate) fn other_version(text: &str) -> Option<u32> {
     (versioned.version != 1).then_some(versioned.version)
 }
 
-/// `path` as seen from `folder`: with `..` where the two part. Absolute paths stay absolute, and
-/// paths become so where the way back out of `folder` is not known, since it has `..` itself.
+/// `path` relative to `folder`, with `..` where they diverge. Absolute paths stay absolute; paths become absolute if the way out of
+/// `folder` is not known because it contains `..` itself.
 pub(crate) fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
     if path.is_absolute() {
         return Ok(path.to_owned());

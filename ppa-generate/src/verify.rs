@@ -24,16 +24,16 @@ use crate::several_limbs::for_each_limb;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
-    /// The dataset.
+    /// The dataset cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file.
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It was asked to stop.
+    /// The verification was asked to stop.
     #[error("not all poses of the sample were made again")]
     Stopped(#[from] Stopped),
-    /// Making a pose again.
+    /// A pose cannot be made again.
     #[error(transparent)]
     Generate(#[from] GenerateError),
     /// The dataset is not that of the plan.
@@ -44,7 +44,7 @@ pub enum VerifyError {
         /// Key in `dataset.json`.
         key: String,
     },
-    /// A share that is none.
+    /// The fraction is not between 0 and 1.
     #[error("the fraction is {0}, expected a number from 0 to 1")]
     Fraction(f64),
 }
@@ -52,20 +52,20 @@ pub enum VerifyError {
 /// What [`verify`] found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verification {
-    /// All files against their records.
+    /// Comparison of all files with their records.
     pub check: Check,
     /// Poses that were made again.
     pub remade: usize,
-    /// Images among these whose bytes came out otherwise.
+    /// Images and records of these poses that differ.
     pub different: Vec<Problem>,
-    /// Doubts about its limbs and poses.
+    /// Findings about its limbs and poses.
     pub findings: Findings,
 }
 
 /// Checks the dataset in the folder or archive `root` as [`check`](crate::check) does, then makes a share of its poses
 /// again, at least one, in a temporary folder, and compares hashes, poses and regions of interest.
 ///
-/// `seed` decides which poses: another seed looks at others. Once `stop` is true no other pose begins.
+/// `seed` selects the poses: another seed selects others. Once `stop` is true no other pose begins.
 ///
 /// # Errors
 /// [`VerifyError`] when the dataset is not that of `plan` or a pose cannot be made.
@@ -118,7 +118,7 @@ pub fn verify(
     })
 }
 
-/// The poses whose address hashes lowest, limb by limb.
+/// The poses with the lowest hashes of their addresses, limb by limb.
 fn sample(limbs: &[LimbJobs], fraction: f64, seed: u64) -> Vec<(&LimbJobs, Vec<PoseAngle>)> {
     let draw = |pose_job: &PoseJob| {
         item_seed(
@@ -155,7 +155,7 @@ fn compare(
         let path = scratch.join(&row.file);
         std::fs::remove_file(&path).map_err(FileError::at("remove", &path))?;
     }
-    // A pose without a record is among the problems of the check.
+    // A pose without a record is reported by the check.
     let Ok(record) = Record::read(root, pose_job) else {
         return Ok(Vec::new());
     };

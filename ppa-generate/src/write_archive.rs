@@ -11,8 +11,8 @@ use ppa_dataset::manifest::Manifest;
 /// Path and bytes of a file.
 pub(crate) type NamedBytes = (String, Vec<u8>);
 
-/// Writes an archive whole or not at all: `dataset.json` and `.ppa/part` as given, of each pose images and record, and what
-/// `rest` returns after the last pose, by name, with the manifest last, since it states that all is there.
+/// Writes an archive whole or not at all: `dataset.json` and `.ppa/part` as given, images and record of each pose, and the files that
+/// `rest` returns after the last pose, by name, with the manifest last, since it marks a complete dataset.
 pub(crate) fn write_archive<E: From<FileError>>(
     path: &Path,
     stated: &[NamedBytes],

@@ -5,8 +5,8 @@ use ppa_scene::{AxisSource, Landmarks, LimbKind, Shaft};
 
 use super::at;
 
-/// A limb turned by θ about an axis inclined by φ to its bone tips the bone by 2 asin(sin(θ/2) sin φ), at 90 degrees by
-/// 1.41 φ. A joint space 3 mm wide and 25 mm deep closes to the beam at 6.8 degrees: 4 degrees use up most of that, 2 less than half.
+/// Rotating a limb by θ about an axis inclined by φ to its bone tilts the bone by 2 asin(sin(θ/2) sin φ), at 90 degrees by 1.41 φ. A joint
+/// space 3 mm wide and 25 mm deep closes to the beam at 6.8 degrees: 4 degrees use up most of that, 2 degrees less than half.
 const CAUTION_DEG: f64 = 2.0;
 const SEVERE_DEG: f64 = 4.0;
 

@@ -8,13 +8,14 @@ use ppa_scene::{Joint, KneeAxis, LandmarkNote, Landmarks, LimbKind};
 
 use super::at;
 
-/// A joint given this far from the ankle that the scan shows is doubted, mm: the talar dome has a radius of about 20.
+/// A joint farther than this along the limb from the ankle that the scan shows is doubted, mm: the talar dome has a radius of about 20.
 const OFF_ANKLE_MM: f64 = 10.0;
 
-/// A joint this far beside the ankle that the scan shows is doubted, mm: an axis through centres of the skin passes up to 13 mm beside it.
+/// A joint farther than this to one side of the ankle that the scan shows is doubted, mm: an axis through centres of the skin passes up to
+/// 13 mm from it.
 const BESIDE_ANKLE_MM: f64 = 20.0;
 
-/// A joint that was moved farther than this on to a given axis is doubted, mm.
+/// A joint that was moved farther than this onto a given axis is doubted, mm.
 const BESIDE_AXIS_MM: f64 = 5.0;
 
 pub(super) fn findings(
@@ -79,7 +80,7 @@ pub(super) fn findings(
     found
 }
 
-/// A doubt without a number.
+/// A caution without a value.
 fn doubt(place: [f64; 3], code: FindingCode, text: &str) -> Finding {
     Finding {
         code,
@@ -90,7 +91,7 @@ fn doubt(place: [f64; 3], code: FindingCode, text: &str) -> Finding {
     }
 }
 
-/// The joint was moved on to an axis that a person gave.
+/// Finding that the joint was moved onto a given axis.
 fn joint_beside_axis(place: [f64; 3], aside_mm: f64) -> Option<Finding> {
     (aside_mm > BESIDE_AXIS_MM).then(|| {
         at(
@@ -105,7 +106,7 @@ fn joint_beside_axis(place: [f64; 3], aside_mm: f64) -> Option<Finding> {
     })
 }
 
-/// The scan shows both joints of the lower leg; the limb is posed about the other one.
+/// Finding that the scan shows both joints of the lower leg; the limb is posed about the other one.
 fn other_joint(joint: Joint, at_mm: [f64; 3]) -> Finding {
     let [x, y, z] = at_mm;
     let article = match joint {
@@ -123,7 +124,7 @@ fn other_joint(joint: Joint, at_mm: [f64; 3]) -> Finding {
     }
 }
 
-/// The femur's shaft, or both shafts, had to give the axis of a knee.
+/// Finding that the axis of a knee follows the femur's shaft or both shafts.
 fn knee_axis(place: [f64; 3], axis: KneeAxis) -> Option<Finding> {
     let text = match axis {
         KneeAxis::Tibia => return None,
@@ -158,7 +159,7 @@ fn off_ankle(place: [f64; 3], depth_hu: f64, joint_above_mm: f64) -> Option<Find
     })
 }
 
-/// The joint of a lower leg lies on another line along the limb than its ankle.
+/// Finding that the joint of a lower leg is to one side of its ankle.
 fn beside_ankle(landmarks: &Landmarks) -> Option<Finding> {
     let place = landmarks.joint_centre;
     let ankle = landmarks.joints.iter().find(|j| j.joint == Joint::Ankle)?;
@@ -174,9 +175,9 @@ fn beside_ankle(landmarks: &Landmarks) -> Option<Finding> {
     })
 }
 
-/// The middle of a limb in which no joint was recognised is not a joint.
+/// Finding that no joint was recognised and the middle of the limb is used.
 ///
-/// Judged by the joint itself: a case records what was found as a choice.
+/// Judged by the position of the joint, since a case records a found joint as a choice.
 fn no_joint(volume: &Volume, report: &LimbReport, landmarks: &Landmarks) -> Option<Finding> {
     if landmarks.limb != LimbKind::Other {
         return None;

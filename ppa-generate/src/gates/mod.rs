@@ -1,7 +1,7 @@
-//! Gates: the doubts of `ppa prepare` about a limb, each with its value and limit.
+//! Gates: plausibility checks of `ppa prepare` on a limb, each with its value and limit.
 //!
-//! Numbers come from [`LimbMeasures`] and [`LimbReport`](ppa_mesh::LimbReport); here they are judged. Everything follows
-//! from scan, skin and landmarks, so that a case that was edited gets new findings.
+//! The values come from [`LimbMeasures`] and [`LimbReport`](ppa_mesh::LimbReport) and are judged here. Everything follows from scan, skin
+//! and landmarks, so that an edited case gets new findings.
 
 mod axis;
 mod joint;
@@ -19,7 +19,7 @@ use ppa_dataset::findings::{Finding, FindingCode, Severity};
 pub use size::NotALimb;
 pub(crate) use size::require_limb;
 
-/// Doubts about a limb with its landmarks, severe ones first.
+/// Returns the findings about a limb with its landmarks, severe ones first.
 ///
 /// # Errors
 /// [`LandmarkError::Reslice`] when the scan cannot be cut across the limb.

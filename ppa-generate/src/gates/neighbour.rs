@@ -6,12 +6,12 @@ use ppa_scene::Neighbour;
 
 use super::at;
 
-/// Where limbs touch, HU do not separate their skins, and the border is found up to 4 voxels beside the true one. Contacts
-/// up to 1 cm² hardly show in an image; 10 cm² are a place 32 mm wide.
+/// Where limbs touch, HU do not separate their skins, and the border found is up to 4 voxels off. Contacts up to 1 cm² hardly show in an
+/// image; 10 cm² is a patch 32 mm wide.
 const CONTACT_CAUTION_CM2: f64 = 1.0;
 const CONTACT_SEVERE_CM2: f64 = 10.0;
 
-/// Cross-sections of legs change by at most 1.1 percent per mm, those of a hand by 1.5, in the scans that were measured.
+/// In the measured scans, cross-sections of legs change by at most 1.1 percent per mm, those of a hand by 1.5.
 const JUMP_PERCENT_PER_MM: f64 = 3.0;
 
 pub(super) fn findings(report: &LimbReport, neighbour: Option<&Neighbour>) -> Vec<Finding> {

@@ -6,14 +6,14 @@ use ppa_scene::{Landmarks, LimbSize};
 
 use super::at;
 
-/// Below this volume nothing can be posed, cm³: a child's wrist 4 cm long.
+/// Smallest volume that can be posed, cm³: a child's wrist 4 cm long.
 const LEAST_CM3: f64 = 50.0;
 
 /// Both regions of the axis are a tenth of this apart in the least case, mm.
 const LEAST_MM: f64 = 40.0;
 
-/// Shorter limbs are doubted, mm: the regions of their axis lie less than half of it apart, over which two centres that are
-/// wrong by 1 mm each turn the axis by more than 2 degrees.
+/// Shorter limbs are doubted, mm: the regions of their axis are less than half of it apart, so that errors of 1 mm in both centres rotate
+/// the axis by more than 2 degrees.
 const SHORT_MM: f64 = 100.0;
 
 /// Thinner limbs are doubted, cm²: the wrist of a small woman, 13.5 cm around, has 14.5.
@@ -35,7 +35,7 @@ pub struct NotALimb {
     pub length_mm: f64,
 }
 
-/// Refuses what can be no limb, before landmarks are looked for in it.
+/// Refuses a body too small for a limb, before landmarks are searched for.
 pub(crate) fn require_limb(report: &LimbReport, spacing_mm: [f64; 3]) -> Result<(), NotALimb> {
     let side = |axis: usize| (report.high[axis] - report.low[axis]) as f64 * spacing_mm[axis];
     let volume_cm3 = 1e-3 * report.limb_mm3;

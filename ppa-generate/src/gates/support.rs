@@ -8,20 +8,20 @@ use ppa_scene::{LandmarkNote, Landmarks, Support};
 
 use super::at;
 
-/// A contact this near to a face of the volume that cuts the limb may lie on the cut, voxels.
+/// A contact within this distance of a face of the volume that cuts the limb may lie on the cut, voxels.
 const NEAR_CUT: f64 = 1.5;
 
-/// Nearer to an axis of the image than this a normal is not measured on skin, radians: over 200 mm it is 0.2 mm, less than
-/// a skin's surface is smooth.
+/// A normal closer than this to an axis of the image was not measured on skin, radians: over 200 mm it is 0.2 mm, less than the roughness
+/// of skin.
 const ALONG_IMAGE_RAD: f64 = 1e-3;
 
-/// Contacts nearer to each other than this do not determine the pitch, mm: a height that is wrong by 1 mm at one of them turns the
-/// plane by 1.1 degrees, and over the second length by 0.6.
+/// Contacts closer together than this do not determine the pitch, mm: a height error of 1 mm at one of them tilts the plane by 1.1 degrees,
+/// and over the second length by 0.6.
 const SPAN_SEVERE_MM: f64 = 50.0;
 const SPAN_CAUTION_MM: f64 = 100.0;
 
-/// Pitches that half a voxel changes by more than this are doubted, degrees: as axes inclined to the shaft, a joint space closes to the
-/// beam at about 7.
+/// Pitches that half a voxel changes by more than this are doubted, degrees: as with axes inclined to the shaft, a joint space closes to
+/// the beam at about 7.
 const PITCH_SEVERE_DEG: f64 = 4.0;
 const PITCH_CAUTION_DEG: f64 = 2.0;
 
@@ -61,7 +61,7 @@ pub(super) fn findings(
 /// Skin may lie this far behind a given plane, mm, since soft tissue yields.
 const DEEP_MM: f64 = 5.0;
 
-/// Faces of the volume that cut the limb: axis of the image, index of the layer, name.
+/// Faces of the volume that cut the limb, with image axis, layer index and name.
 fn cuts(report: &LimbReport) -> impl Iterator<Item = (usize, f64, &str)> {
     report.cut_faces.iter().filter_map(|cut| {
         let axis = ["i", "j", "k"]
@@ -75,7 +75,7 @@ fn cuts(report: &LimbReport) -> impl Iterator<Item = (usize, f64, &str)> {
     })
 }
 
-/// Contacts on faces that cut the limb along the scan; where the scan ends its skin is skin.
+/// Findings about contacts on faces along the scan axis that cut the limb; at the ends of the scan, skin is skin.
 fn on_cut(volume: &Volume, report: &LimbReport, support: &Support) -> Vec<Finding> {
     let grid = volume.grid();
     let scan_axis = grid.direction().transpose().column(2).iamax();
@@ -103,8 +103,8 @@ fn on_cut(volume: &Volume, report: &LimbReport, support: &Support) -> Vec<Findin
     findings.collect()
 }
 
-/// A plane across an axis of the image whose contacts lie on a cut across it. Elsewhere such a plane is right: a limb can lie on a
-/// level couch.
+/// Finding about a plane perpendicular to an image axis whose contacts lie on a cut face of that axis. Elsewhere such a plane is correct: a
+/// limb can lie on a level couch.
 fn along_image(volume: &Volume, report: &LimbReport, support: &Support) -> Option<Finding> {
     let normal = Vector3::from(support.normal);
     let grid = volume.grid();

@@ -1,4 +1,4 @@
-//! Datasets in archives: the files of the folder, whatever interrupts or damages them.
+//! Datasets in archives: the same files as in a folder, despite interruption and damage.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -94,7 +94,7 @@ fn an_interrupted_archive_keeps_its_poses() {
         failing.run(&path).unwrap_err();
         let made = status(&path).map_or(0, |found| found.made);
         assert_eq!(path.exists(), made > 0);
-        // Poses that ran beside the one that failed are kept as well.
+        // Poses that ran in parallel with the failed one are kept as well.
         assert!(made >= fails_at && made < 20, "{made}");
         assert_eq!(trial().run(&path).unwrap().made, 20 - made);
         assert!(fs::read(&path).unwrap() == whole);
@@ -155,7 +155,7 @@ fn flipped_bits_in_an_archive_are_found_and_healed() {
             "bit {bit}"
         );
         let Ok(summary) = trial().run(&path) else {
-            // Without a valid dataset.json nothing says what the archive is.
+            // Without a valid dataset.json the content of the archive is unknown.
             assert!(fs::read(&path).unwrap() == bytes, "bit {bit}");
             continue;
         };

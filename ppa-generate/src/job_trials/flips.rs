@@ -18,7 +18,7 @@ fn files(root: &Path) -> Vec<PathBuf> {
     files.map(|(file, _)| file).collect()
 }
 
-/// Flips one bit of a file, each file being as likely as the others. Returns it with its bytes before and after.
+/// Flips one bit of a random file, each with equal probability. Returns it with its bytes before and after.
 fn flip(root: &Path, files: &[PathBuf], draw: &mut Draw) -> (PathBuf, Vec<u8>, Vec<u8>) {
     let file = files[draw.below(files.len())].clone();
     let before = fs::read(root.join(&file)).unwrap();
@@ -46,7 +46,7 @@ fn each_of_a_thousand_flipped_bits_is_found() {
             let (file, before, _) = flip(root, &files, &mut draw);
             let found = check(root).map_or(true, |check| !check.problems.is_empty());
             assert!(found, "{} is not reported", file.display());
-            // Without the records, as in a published copy, all else is covered as well.
+            // Without the records, as in a published copy, everything else is covered as well.
             if !file.starts_with(".ppa") {
                 let found = inspect(root).map_or(true, |found| !found.flaws.is_empty());
                 assert!(found, "{} is not reported without records", file.display());

@@ -1,4 +1,4 @@
-//! A run killed between any two steps of putting a pose in its place.
+//! A run killed between any two steps of moving a pose into place.
 
 use std::fs;
 use std::path::Path;
@@ -69,7 +69,7 @@ fn a_first_run_that_was_killed_resumes() {
         let folder = first.made();
         let root = folder.path();
         kill_after(root, &Trial::new(), moved);
-        // A file that is lost on top of it.
+        // A file is lost in addition.
         if let Some(lost) = lost {
             let images = Trial::new().limbs()[0]
                 .pose_jobs()

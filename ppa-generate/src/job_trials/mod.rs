@@ -44,7 +44,7 @@ struct Trial {
     acknowledged: Vec<FindingCode>,
     part: &'static str,
     replace: bool,
-    /// The pose that fails, counted as they are made.
+    /// The pose that fails, in the order in which poses are made.
     fails_at: Option<usize>,
 }
 
@@ -211,7 +211,7 @@ impl Trial {
     }
 }
 
-/// Writes an image that follows from key and name, and returns its row.
+/// Writes an image that depends on key and name, and returns its row.
 fn row(pose_job: &PoseJob, file: String, kind: FileKind, shape: BodyShape, to: &Path) -> FileRow {
     let path = to.join(&file);
     fs::create_dir_all(path.parent().unwrap()).unwrap();

@@ -96,7 +96,7 @@ fn a_broken_replacement_leaves_each_pose_whole() {
             assert!(!root.join("manifest.jsonl").exists());
             let now = status(root).unwrap();
             assert_eq!((now.made, now.complete), (replaced, false));
-            // Neither plan is carried out unasked.
+            // Neither plan replaces poses unasked.
             assert!(
                 other()
                     .run(root)
@@ -128,7 +128,7 @@ fn a_plan_that_shrinks_removes_poses_only_when_asked_to() {
         ),
         "{said}"
     );
-    // What readers wrote stays.
+    // Files written by readers stay.
     let labels = root.join("patient_7/labels/r/labels.json");
     fs::write(&labels, "{}").unwrap();
     let summary = narrow.replacing().run(root).unwrap();
@@ -207,7 +207,7 @@ fn another_part_is_refused_even_when_replacing() {
     }
 }
 
-/// What stands where images belong and is none of the dataset's is kept.
+/// Foreign files at paths of images are kept.
 #[test]
 fn files_of_others_are_never_overwritten() {
     let folder = Trial::new().made();
@@ -234,7 +234,7 @@ fn files_of_others_are_never_overwritten() {
     fs::remove_file(root.join(hidden)).unwrap();
     assert!(in_place(root) == other().fresh());
 
-    // A second one gets a name of its own.
+    // A second one gets its own name.
     fs::write(root.join(edited), "again").unwrap();
     let summary = other().run(root).unwrap();
     assert_eq!(summary.set_aside, [format!(".ppa/altered/{edited}.1")]);

@@ -18,14 +18,14 @@ use crate::pose_id::PoseId;
 use crate::record::{PoseJob, Record};
 use crate::staging::staging_folder;
 
-/// A plan of limbs in fifty poses each, in tasks of one shard.
+/// A plan of limbs in fifty poses each, divided into tasks of one shard.
 struct Tasks {
     plan: Trial,
     root: tempfile::TempDir,
     count: usize,
-    /// How the names of shards end: `.tar`, or nothing for folders.
+    /// File name ending of shards: `.tar`, or nothing for folders.
     ending: &'static str,
-    /// How often each pose was made.
+    /// Number of times each pose was made.
     made: Mutex<BTreeMap<String, usize>>,
 }
 
@@ -50,7 +50,7 @@ impl Tasks {
         self.root.path().join(format!("{task}{}", self.ending))
     }
 
-    /// Runs a task until it has made `most` poses; whether it came to its end.
+    /// Runs a task until it has made `most` poses; returns whether it completed.
     fn run(&self, task: usize, most: usize) -> bool {
         let part: Part = format!("{}/{}", task + 1, self.count).parse().unwrap();
         let part_text: &'static str = part.to_string().leak();

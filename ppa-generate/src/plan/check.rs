@@ -7,14 +7,14 @@ use ppa_xray::{AnalogSettings, Projection, Spectrum};
 
 use super::Plan;
 
-/// Farther out or in, a limb is none any more, mm.
+/// Largest offset of a body shape that is still a limb, mm.
 const MOST_OFFSET_MM: f64 = 100.0;
 
-/// Bumps of a body shape: without any it would be `orig`, with more they cover the skin.
+/// Number of bumps of a body shape: without any it would be `orig`; more would cover the skin.
 const BUMPS: std::ops::RangeInclusive<usize> = 1..=100;
 
 impl Plan {
-    /// Whether a dataset can be made of it; says what is wrong.
+    /// Checks whether a dataset can be made from the plan; the error says what is wrong.
     pub(crate) fn check(&self) -> Result<(), String> {
         if self.cases.is_empty() {
             return Err("no [[case]]: a plan needs at least one limb".to_owned());
@@ -132,7 +132,7 @@ impl Plan {
         Ok(())
     }
 
-    /// What is known of room, beam and image without a limb.
+    /// Checks room, beam and image as far as possible without a limb.
     fn check_room_and_exposure(&self) -> Result<(), String> {
         let (room, xray) = (&self.room.parametric, &self.xray);
         // A recorded room has furniture of its own.

@@ -27,18 +27,18 @@ pub enum PlanError {
         /// Its version.
         found: u32,
     },
-    /// The HU calibration it names.
+    /// Its HU calibration cannot be used.
     #[error(transparent)]
     Calibration(#[from] ppa_xray::CalibrationError),
-    /// Its camera rig.
+    /// Its camera rig cannot be used.
     #[error(transparent)]
     Rig(#[from] ppa_depth::RigError),
-    /// Something in it cannot work.
+    /// A value of the plan is invalid.
     #[error("{}: {message}", path.display())]
     Invalid {
         /// The plan file.
         path: PathBuf,
-        /// What, and what was expected.
+        /// What is wrong, and what was expected.
         message: String,
     },
 }

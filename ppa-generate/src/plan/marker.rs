@@ -1,10 +1,10 @@
-//! Where a plan puts the side marker.
+//! Position of the side marker.
 
 use ppa_core::Side;
 use ppa_xray::SideMarker;
 use serde::{Deserialize, Serialize};
 
-/// The letter L or R of lead on the detector, by the side of each limb.
+/// The lead letter L or R on the detector, for the side of each limb.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MarkerPlace {

@@ -105,7 +105,7 @@ impl Plan {
         along_mm == other.positioning.beam_shift_mm[1] && self.xray.same_voxels(&other.xray)
     }
 
-    /// The person whose limb a case file is, with its changes or without; none if the plan does not name the file.
+    /// Returns the patient of a case file, or of the file with its changes; `None` if the plan does not name it.
     pub fn patient_of(&self, case_file: &Path) -> Option<u32> {
         let original = |file: &Path| {
             let file = original_case(file).unwrap_or_else(|| file.to_owned());
@@ -128,7 +128,7 @@ impl Plan {
     /// Parses the text of a plan; `path` is its file, which need not exist yet.
     ///
     /// # Errors
-    /// As of [`Plan::read`].
+    /// The same as [`Plan::read`].
     pub fn of_text(text: &str, path: &Path) -> Result<Self, PlanError> {
         if let Some(found) = other_version(text) {
             let path = path.to_owned();
@@ -179,7 +179,7 @@ impl Plan {
         Ok(write_whole(path, to_toml(&plan, path)?.as_bytes())?)
     }
 
-    /// The files that it names.
+    /// The files that the plan names.
     pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let cases = self.cases.iter_mut().map(|case| &mut case.file);
         let others = [

@@ -86,10 +86,10 @@ impl RoomFile {
         Ok(write_whole(path, to_toml(&file, path)?.as_bytes())?)
     }
 
-    /// Puts this room into a plan that says nothing about it.
+    /// Puts this room into a plan that does not define one.
     ///
     /// # Errors
-    /// The key that the plan gives as well.
+    /// Names the key that the plan also gives.
     pub(crate) fn put_into(self, plan: &mut Plan) -> Result<(), String> {
         let fresh = Plan::new(Vec::new());
         let twice = [
@@ -117,10 +117,10 @@ impl RoomFile {
 }
 
 impl Plan {
-    /// A plan without limbs in the room of a file.
+    /// Creates a plan without limbs in the room of a file.
     ///
     /// # Errors
-    /// As [`RoomFile::read`].
+    /// The same as [`RoomFile::read`].
     pub fn in_room(path: &Path) -> Result<Self, PlanError> {
         let mut plan = Self::new(Vec::new());
         let file = RoomFile::read(path)?;

@@ -36,7 +36,7 @@ pub struct PlanRoom {
 pub struct DepthSettings {
     /// Camera rig (JSON); the built-in Azure Kinect pair when absent.
     pub rig: Option<PathBuf>,
-    /// The camera rig written out, instead of a file.
+    /// The camera rig itself, instead of a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cameras: Option<RigSpec>,
     /// Side of the square region of interest around the joint, mm at the joint.
@@ -100,7 +100,7 @@ pub struct XraySettings {
     pub half_length_mm: f64,
     /// Largest voxel size in photon transport, mm: thicker slices are interpolated, so that bone edges show no steps.
     pub max_voxel_mm: f64,
-    /// Density between the centres of these voxels.
+    /// Interpolation of density between the centres of these voxels.
     pub interpolation: Interpolation,
     /// Form factors of Rayleigh scattering.
     pub form_factors: FormFactors,
@@ -164,7 +164,7 @@ impl XraySettings {
         ))
     }
 
-    /// Whether a limb has the same voxels with both.
+    /// Whether both settings give a limb the same voxels.
     pub(crate) fn same_voxels(&self, other: &Self) -> bool {
         self.half_length_mm == other.half_length_mm
             && self.max_voxel_mm == other.max_voxel_mm

@@ -151,7 +151,7 @@ fn what_cannot_work_is_named() {
     }
 }
 
-/// Of a newer format more than the version is unknown; the version is what matters.
+/// A newer format may have unknown keys; its version is reported first.
 #[test]
 fn another_version_is_reported_before_its_keys() {
     let folder = tempfile::tempdir().unwrap();
@@ -189,7 +189,7 @@ fn unknown_keys_are_named() {
     }
 }
 
-/// Written beside or above what it names, a plan continues naming the same files.
+/// Written to another folder, a plan still names the same files.
 #[test]
 fn a_plan_that_is_written_elsewhere_names_the_same_files() {
     let folder = tempfile::tempdir().unwrap();
