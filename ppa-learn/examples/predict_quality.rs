@@ -1,4 +1,4 @@
-//! From a depth image to the answer of a network, and its weights to a file and back.
+//! Predicts the quality of a depth image with a network, then saves and loads the weights.
 //!
 //! `cargo run -p ppa-learn --example predict_quality`
 
@@ -9,11 +9,11 @@ use ppa_core::Roi;
 use ppa_learn::data::{Raster, evaluation_input, prepare};
 use ppa_learn::{EfficientNetB0, FirstConvolution, Mode, Options};
 
-/// Columns and rows that the network sees.
+/// Columns and rows of the network's input.
 const SIDE: usize = 96;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // A ridge 150 mm before a table at 1.2 m, as a camera of 640 x 576 pixels sees it.
+    // A ridge 150 mm in front of a table at 1.2 m, in an image of 640 x 576 pixels.
     let depth_mm = (0..640 * 576)
         .map(|pixel: i32| 1200 - 150_u16.saturating_sub((pixel % 640 - 320).unsigned_abs() as u16));
     let image = Raster::new(640, 576, depth_mm.collect())?;

@@ -1,11 +1,11 @@
 //! Images per second of training, inference or loading: `speed train|infer|load|augment THREADS BATCH SIZE STEPS [DEVICE]`.
 //!
-//! DEVICE is where `train` and `infer` compute, `cpu` by default; steps on a device wait for each other through the loss.
+//! DEVICE is where `train` and `infer` compute, `cpu` by default; reading the loss makes each step on a device wait for the one before.
 //!
-//! `load` makes training batches with the paper's augmentation from depth images of 640 x 576 pixels on disk, read again each time;
-//! `augment` from those that were read before. THREADS are the loader's then.
+//! `load` makes training batches with the paper's augmentation from depth images of 640 x 576 pixels, read from disk each time;
+//! `augment` uses images that are already in memory. For both, THREADS is the number of loader threads.
 //!
-//! Prints one JSON object with the images, wall and processor seconds after one step to warm up, for benches beside other programs.
+//! Prints one JSON object with the images and the wall and processor seconds after one warm-up step, for comparison with other programs.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -101,7 +101,7 @@ fn report(images: usize, (wall_s, cpu_s): (f64, f64), last: f64) -> anyhow::Resu
     Ok(())
 }
 
-/// Depth images of a limb-like ridge before a tilted table, with noise of a few mm.
+/// Depth images of a limb-like ridge in front of a tilted table, with noise of a few mm.
 fn depth_images(folder: &Path, count: u32) -> anyhow::Result<Vec<Sample>> {
     let mut samples = Vec::new();
     for number in 0..count {
@@ -154,7 +154,7 @@ fn load(
     let images = Images::new(depth_images(folder.path(), 64)?, size, keep_bytes)?;
     let number = |n: usize| NonZeroUsize::new(n).context("expected at least 1 worker and image");
     for sample in 0..images.samples().len() {
-        images.get(sample)?; // Those that are kept are read before the clock starts.
+        images.get(sample)?; // Reads the images to be kept before the clock starts.
     }
     let order = Order::Training {
         balanced: Balanced::new(images.samples())?,
@@ -172,7 +172,7 @@ fn load(
     report(batch * steps, seconds, last)
 }
 
-/// Peak resident memory, from Linux.
+/// Peak resident memory in GiB, as Linux reports it.
 fn peak_gib() -> anyhow::Result<f64> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let line = status

@@ -1,4 +1,4 @@
-//! Where networks compute, as configurations and commands name it.
+//! Devices on which networks compute, as named in configurations and commands.
 
 pub mod launch;
 
@@ -8,7 +8,7 @@ use std::str::FromStr;
 use candle_core::Device;
 use serde::{Deserialize, Serialize};
 
-/// Where a network computes: `"cpu"`, `"cuda"` for the first NVIDIA device, or `"cuda:1"` for the second.
+/// Device on which a network computes: `"cpu"`, `"cuda"` for the first NVIDIA device, or `"cuda:1"` for the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum DeviceName {
@@ -19,16 +19,16 @@ pub enum DeviceName {
     Cuda(usize),
 }
 
-/// Why a device cannot be used.
+/// Error in opening a device.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceError {
-    /// No such name.
+    /// An unknown name.
     #[error(
         "unknown device {found:?}; expected \"cpu\", \"cuda\" or a numbered one such as \"cuda:1\""
     )]
     Unknown {
-        /// What stands there.
+        /// The name found.
         found: String,
     },
     /// The feature `cuda` is off.
@@ -39,18 +39,18 @@ pub enum DeviceError {
         /// The device.
         name: DeviceName,
     },
-    /// There is none, or its driver fails.
+    /// There is no such device, or its driver fails.
     #[error("device \"{name}\" cannot be used")]
     Unavailable {
         /// The device.
         name: DeviceName,
-        /// What candle or the driver said.
+        /// Error of candle or of the driver.
         source: candle_core::Error,
     },
 }
 
 impl DeviceName {
-    /// The device itself.
+    /// Opens the device.
     ///
     /// # Errors
     /// [`DeviceError`] if the program was built without it, or the machine has none.

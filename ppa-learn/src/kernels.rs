@@ -1,7 +1,7 @@
-//! Arithmetic on channels-last images: rows of pixels, each pixel with all its channels in a row of f32. Inference also has rows of
-//! pixels with 16 channels each (`panel_rows`).
+//! Arithmetic on channels-last images: rows of pixels, with all f32 channels of a pixel next to each other. Inference also uses rows
+//! of pixels with 16 channels each (`panel_rows`).
 //!
-//! Every kernel is vector code selected at run time; the plain copy gives the same results up to rounding.
+//! Every kernel is vector code selected at run time; the scalar version gives the same results up to rounding.
 
 pub(crate) mod batch_norm;
 pub(crate) mod buffer;

@@ -1,4 +1,4 @@
-//! EfficientNet-B0 (Tan and Le 2019, arXiv:1905.11946) for one channel in and one value out, as torchvision builds it.
+//! EfficientNet-B0 (Tan and Le 2019, arXiv:1905.11946) with one input channel and one output value, built as in torchvision.
 
 mod architecture;
 mod backward;
@@ -43,17 +43,17 @@ pub use quality::{CORRECTION_UNIT_DEG, Place, PosePrediction, QualityNetwork, Ta
 use crate::kernels::buffer::Pool;
 use crate::random::{Purpose, stream};
 
-/// How much is left out at random while training.
+/// Dropout and stochastic depth in training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Probability that a feature is left out before the last layer.
+    /// Probability that a feature is dropped before the last layer.
     pub dropout: f32,
-    /// Probability that the last block leaves out its residual branch for an image; block i of 16 does with i/16 of it.
+    /// Probability that the last block drops its residual branch for an image; block i of 16 has i/16 of this probability.
     pub stochastic_depth: f32,
 }
 
 impl Default for Options {
-    /// As the paper's authors train: 0.5 and 0.2.
+    /// The values of the paper's authors: 0.5 and 0.2.
     fn default() -> Self {
         Self {
             dropout: 0.5,
@@ -62,28 +62,28 @@ impl Default for Options {
     }
 }
 
-/// What a forward pass is for.
+/// Purpose of a forward pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Normalises by the batch, moves the running statistics, and leaves out what (seed, step) says.
+    /// Normalises by the batch, updates the running statistics, and applies dropout determined by (seed, step).
     ///
-    /// A network that is run twice in one step needs two numbers for the two to leave out different things.
+    /// A network that is run twice in one step needs two different numbers for independent dropout.
     Train {
         /// Index of the random numbers.
         step: u64,
     },
-    /// Normalises by the batch and leaves out nothing. The running statistics become the mean of those of the batches so far, whatever
+    /// Normalises by the batch, without dropout. The running statistics become the mean of those of the batches so far, whatever
     /// they were before the first one.
     Statistics {
-        /// Batches so far.
+        /// Number of batches so far.
         batches: u64,
     },
-    /// Normalises by the running statistics and leaves out nothing.
+    /// Normalises by the running statistics, without dropout.
     Eval,
 }
 
 impl Mode {
-    /// How much of a batch enters the running statistics.
+    /// Returns the weight of a batch in the update of the running statistics.
     fn momentum(self) -> f64 {
         match self {
             Self::Train { .. } => norm::MOMENTUM,
@@ -92,7 +92,7 @@ impl Mode {
         }
     }
 
-    /// The step whose random numbers draw dropout and stochastic depth; `None` where neither applies.
+    /// Returns the step whose random numbers determine dropout and stochastic depth; `None` if neither applies.
     fn dropout_step(self) -> Option<u64> {
         match self {
             Self::Train { step } => Some(step),
@@ -101,19 +101,19 @@ impl Mode {
     }
 }
 
-/// A named tensor of the network, in torchvision's order and by its names.
+/// A tensor of the network with torchvision's name.
 #[derive(Debug, Clone)]
 pub struct Named {
     /// torchvision's name, such as `features.0.0.weight`.
     pub name: String,
-    /// Its values now, in torchvision's shape; a copy.
+    /// Copy of its current values, in torchvision's shape.
     pub tensor: Tensor,
 }
 
-/// EfficientNet-B0 with 4,008,253 parameters for one output, all f32; made on the CPU, see [`EfficientNetB0::to_device`].
+/// EfficientNet-B0 with 4,008,253 parameters for one output, all f32; created on the CPU, see [`EfficientNetB0::to_device`].
 ///
-/// The parameters are two flat variables, one of the backbone and one of the classifier, so that a whole backbone is a
-/// single operation to candle: `loss.backward()` gives one gradient for each of the two. [`EfficientNetB0::parameters`] names their parts.
+/// The parameters are two flat variables, one of the backbone and one of the classifier, so that the backbone is a single
+/// operation in candle: `loss.backward()` gives one gradient for each of the two. [`EfficientNetB0::parameters`] names their parts.
 #[derive(Debug, Clone)]
 pub struct EfficientNetB0 {
     architecture: std::sync::Arc<Architecture>,
@@ -121,15 +121,15 @@ pub struct EfficientNetB0 {
     classifier: Var,
     statistics: Var,
     pool: Pool,
-    /// The convolutions laid out, of a network whose variables stay as they are.
+    /// Prearranged convolutions of a network whose variables do not change.
     folded: Option<std::sync::Arc<Folded>>,
     seed: u64,
     options: Options,
 }
 
 impl EfficientNetB0 {
-    /// A network with torchvision's first values: convolutions normal with variance 2 / fan-out, the last layer uniform
-    /// in ±1 / sqrt(outputs), normalisation 1 and 0. `seed` fixes them and what training leaves out.
+    /// Makes a network with torchvision's initial values: convolutions normal with variance 2 / fan-out, the last layer uniform
+    /// in ±1 / sqrt(outputs), normalisation 1 and 0. `seed` determines them and the dropout in training.
     ///
     /// # Errors
     /// If candle cannot make the variables.
@@ -137,7 +137,7 @@ impl EfficientNetB0 {
         Self::with_outputs(seed, options, 1)
     }
 
-    /// The same with another number of values for each image.
+    /// The same as [`EfficientNetB0::new`], with `outputs` values for each image.
     ///
     /// # Errors
     /// If candle cannot make the variables.
@@ -161,18 +161,18 @@ impl EfficientNetB0 {
         })
     }
 
-    /// One value for each image [images, 1], from images [images, 1, height, width] in f32, of any height and width.
+    /// Computes one value for each image [images, 1], from images [images, 1, height, width] in f32, of any height and width.
     ///
     /// # Errors
-    /// If the images have another shape, or train on a single value for each channel.
+    /// If the images have another shape, or if training would normalise by a single value for each channel.
     pub fn forward(&self, images: &Tensor, mode: Mode) -> Result<Tensor, NetworkError> {
         self.classify(&self.features(images, mode)?, mode)
     }
 
-    /// The features [images, 1280] that the last layer sees.
+    /// Computes the features [images, 1280], the input of the last layer.
     ///
     /// # Errors
-    /// As [`EfficientNetB0::forward`].
+    /// The same as [`EfficientNetB0::forward`].
     pub fn features(&self, images: &Tensor, mode: Mode) -> Result<Tensor, NetworkError> {
         let &[count, 1, height, width] = images.dims() else {
             return Err(NetworkError::Shape {
@@ -191,7 +191,7 @@ impl EfficientNetB0 {
                 width,
             });
         }
-        // Our kernels know the CPU only.
+        // The SIMD kernels run only on the CPU.
         if !self.device().is_cpu() {
             return Ok(on_device::features(self, images, mode)?);
         }
@@ -199,7 +199,7 @@ impl EfficientNetB0 {
         Ok(images.contiguous()?.apply_op2(&self.backbone, operation)?)
     }
 
-    /// The last layer on features [images, 1280], after dropout while training.
+    /// Applies the last layer to features [images, 1280], in training after dropout.
     ///
     /// # Errors
     /// If the features have another shape.
@@ -224,12 +224,12 @@ impl EfficientNetB0 {
         &self.architecture
     }
 
-    /// Where it computes, and where its images have to be.
+    /// Returns the device on which the network computes and its images must be.
     pub fn device(&self) -> &Device {
         self.backbone.device()
     }
 
-    /// A copy on another device; on the CPU with our kernels, elsewhere with operations of candle.
+    /// Returns a copy on another device.
     ///
     /// # Errors
     /// If candle cannot copy.
@@ -245,28 +245,28 @@ impl EfficientNetB0 {
         })
     }
 
-    /// The two flat variables that training changes: the backbone's and the classifier's.
+    /// Returns the two flat variables that training changes: the backbone's and the classifier's.
     pub fn variables(&self) -> [&Var; 2] {
         [&self.backbone, &self.classifier]
     }
 
-    /// The running means and variances of all normalisations, one flat variable that training moves but has no gradient.
+    /// Returns the running means and variances of all normalisations, one flat variable that training updates without a gradient.
     pub fn statistics_variable(&self) -> &Var {
         &self.statistics
     }
 
-    /// Where in [`EfficientNetB0::variables`] (first index) each parameter lies, in torchvision's order.
+    /// Returns the position of each parameter in [`EfficientNetB0::variables`] (first index), in torchvision's order.
     pub fn layout(&self) -> impl Iterator<Item = (usize, &Entry)> {
         let backbone = self.architecture.backbone.iter().map(|entry| (0, entry));
         backbone.chain(self.architecture.classifier.iter().map(|entry| (1, entry)))
     }
 
-    /// Where in [`EfficientNetB0::statistics_variable`] each running mean and variance lies.
+    /// Returns the position of each running mean and variance in [`EfficientNetB0::statistics_variable`].
     pub fn statistics_layout(&self) -> impl Iterator<Item = &Entry> {
         self.architecture.statistics.iter()
     }
 
-    /// Every parameter by name.
+    /// Returns every parameter by name.
     ///
     /// # Errors
     /// If candle cannot copy.
@@ -274,7 +274,7 @@ impl EfficientNetB0 {
         self.named([self.backbone.as_tensor(), self.classifier.as_tensor()])
     }
 
-    /// The parts by name of two flat tensors that go with [`EfficientNetB0::variables`], such as their gradients.
+    /// Returns the named parts of two flat tensors laid out as [`EfficientNetB0::variables`], such as their gradients.
     ///
     /// # Errors
     /// If the tensors have other lengths than the variables.
@@ -284,7 +284,7 @@ impl EfficientNetB0 {
             .collect()
     }
 
-    /// The running means and variances by name.
+    /// Returns the running means and variances by name.
     ///
     /// # Errors
     /// If candle cannot copy.
@@ -302,9 +302,9 @@ pub(crate) fn variable(values: Vec<f32>) -> Result<Var, NetworkError> {
     Ok(Var::from_tensor(&tensor)?)
 }
 
-/// A copy of a variable on a device.
+/// Returns a copy of a variable on a device.
 fn on_device(variable: &Var, device: &Device) -> Result<Var, NetworkError> {
-    // Of what is a variable already, `from_tensor` would make no copy.
+    // `from_tensor` would not copy a tensor that is already a variable.
     let values = variable.as_detached_tensor().to_device(device)?;
     Ok(Var::from_tensor(&values)?)
 }

@@ -1,4 +1,4 @@
-//! Comparison of the network with reference values of another program.
+//! Comparison of the network with reference values from another program.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -9,19 +9,20 @@ use serde::Serialize;
 use crate::network::{EfficientNetB0, Mode, Options};
 use crate::weights::{FirstConvolution, WeightsError};
 
-/// How far the network is from reference values.
+/// Deviations of the network from reference values.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Parity {
-    /// Over the outputs in evaluation (`eval_output_f64`) and in training without dropout and stochastic depth (`train_output_f64`).
+    /// Maximum over the outputs in evaluation (`eval_output_f64`) and in training without dropout and stochastic depth
+    /// (`train_output_f64`).
     pub max_abs_output_error: f64,
     /// Mean squared error in training.
     pub loss: f64,
-    /// Over the gradients `grad_f64.NAME` of the loss: length of the difference by length of the reference. References shorter
-    /// than 1e-6 of the whole gradient are left out: biases before another normalisation, whose gradient is zero in theory.
+    /// Maximum over the gradients `grad_f64.NAME` of the loss of the length of the difference relative to the reference. References
+    /// shorter than 1e-6 of the total gradient are left out: biases before another normalisation, whose gradient is zero in theory.
     pub worst_gradient_rel_l2: f64,
 }
 
-/// Runs the network with `weights` on `input` and `target` of the safetensors file `io`, and compares.
+/// Runs the network with `weights` on `input` and `target` of the safetensors file `io`, and compares the results.
 ///
 /// # Errors
 /// If a file cannot be read, the weights do not fit, or `io` lacks a tensor.
@@ -106,7 +107,7 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
     })
 }
 
-/// The larger of two errors; what is not a number is as wrong as can be.
+/// Returns the larger of two errors; NaN counts as infinite.
 fn larger(a: f64, b: f64) -> f64 {
     if b.is_nan() { f64::INFINITY } else { a.max(b) }
 }

@@ -1,31 +1,31 @@
-//! Random numbers by address: (seed, purpose, index) identifies a stream, no matter who draws from it and when.
+//! Random numbers by address: (seed, purpose, index) identifies a stream, independent of the order of use.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What a stream of random numbers is for; streams of different purposes never share numbers.
+/// Purpose of a stream of random numbers; streams of different purposes never share numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// First values of the weights; index: the parameter's place in the network.
+    /// Initial values of the weights; index: the parameter's position in the network.
     Weights = 0,
-    /// Dropout and stochastic depth; index: the step of training.
+    /// Dropout and stochastic depth; index: twice the training step, plus 1 for dropout.
     Dropout = 1,
-    /// Which images a batch holds; index: the place in the endless sequence of images.
+    /// Images of a batch; index: the position in the endless sequence of images.
     Sampling = 2,
-    /// Augmentation of one image; index: its place in the endless sequence of images.
+    /// Augmentation of one image; index: its position in the endless sequence of images.
     Augmentation = 3,
-    /// Which persons are tested in which fold.
+    /// Persons tested in each fold.
     Folds = 4,
-    /// First values of what joins both cameras; index: the layer's place.
+    /// Initial values of the layers that join both cameras; index: the layer's position.
     FusionWeights = 5,
-    /// Dropout where both cameras are joined; index: the step of training.
+    /// Dropout in the layers that join both cameras; index: the training step.
     FusionDropout = 6,
     /// Seeds of the networks of both cameras; index: the camera.
     Branches = 7,
 }
 
-/// The stream of random numbers at `index` of a purpose (ChaCha with 8 rounds; key from `seed`, nonce from the address).
+/// Returns the stream of random numbers at `index` of a purpose (ChaCha with 8 rounds; key from `seed`, nonce from the address).
 ///
 /// # Panics
 /// If `index` is 2^56 or more.

@@ -1,4 +1,4 @@
-//! Values of a whole network by torchvision's names, from files and to files.
+//! Reading and writing of all values of a network by torchvision's names.
 
 mod file;
 mod metadata;
@@ -20,37 +20,37 @@ use serde::{Deserialize, Serialize};
 
 use crate::network::{EfficientNetB0, Entry, NetworkError};
 
-/// What becomes of a first convolution that was trained on several channels.
+/// Conversion of a first convolution that was trained on several channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FirstConvolution {
     /// Discarded: the network keeps its own, as the paper's authors do.
     #[default]
     Fresh,
-    /// The sum over the channels: what an image that is the same in all channels would have given.
+    /// The sum over the channels: equivalent to an image that is the same in all channels.
     Sum,
     /// The mean over the channels.
     Mean,
 }
 
-/// What was not taken from a weight file as it stood.
+/// Record of what was not taken unchanged from a weight file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loaded {
-    /// How a first convolution of several channels became one of one channel.
+    /// How a first convolution of several channels was converted to one channel.
     pub first_convolution: Option<FirstConvolution>,
-    /// The file's classifier has another number of outputs; the network kept its own.
+    /// Whether the file's classifier has a different number of outputs, so that the network kept its own.
     pub fresh_classifier: bool,
-    /// One clause for each tensor that is missing or has another shape, and that the network kept as it was.
+    /// One clause for each tensor that is missing or has another shape, so that the network kept its own.
     pub kept: Vec<String>,
-    /// Names in the file that the network does not have, without PyTorch's counters of batches.
+    /// Names in the file that the network does not have, except PyTorch's batch counters.
     pub unused: Vec<String>,
 }
 
-/// Why a network could not take the values that it was given, or not write its own.
+/// Error in reading or writing the values of a network.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightsError {
-    /// Tensors that are not there, have another shape or hold what is not a weight.
+    /// Tensors that are missing, have another shape or contain invalid weights.
     #[error("{} not fit EfficientNet-B0 with one channel: {}{}", place(.path), .misfits.join("; "), beyond(.unused))]
     Misfit {
         /// The file, if the values came from one.
@@ -65,7 +65,7 @@ pub enum WeightsError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A file that cannot be written.
@@ -94,7 +94,7 @@ fn beyond(unused: &[String]) -> String {
 }
 
 impl WeightsError {
-    /// Names the file, and what it holds beyond the network.
+    /// Adds the file and the names in it that the network does not have.
     pub(crate) fn in_file(self, file: &Path, unused: &[String]) -> Self {
         match self {
             Self::Misfit { misfits, .. } => Self::Misfit {
@@ -108,10 +108,10 @@ impl WeightsError {
 }
 
 impl EfficientNetB0 {
-    /// Takes the values of every parameter and running statistic, by torchvision's names; other names are not looked at.
+    /// Sets every parameter and running statistic by torchvision's names; other names are ignored.
     ///
     /// # Errors
-    /// If any is missing, has another shape or holds what is not a weight, each named; the network is then as before.
+    /// If tensors are missing, have another shape or contain invalid weights, naming each; the network is then unchanged.
     pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
         let statistics = self.statistics_layout().map(|entry| (2, entry));
         let [backbone, classifier] = self.variables();
@@ -120,7 +120,7 @@ impl EfficientNetB0 {
     }
 }
 
-/// Fills flat variables with tensors, by the names of entries that lie one after the other in each.
+/// Fills flat variables with tensors, by the names of the consecutive entries of each variable.
 fn assign<'a>(
     variables: &[&Var],
     entries: impl IntoIterator<Item = (usize, &'a Entry)>,
@@ -155,7 +155,7 @@ fn missing(name: &str) -> String {
     format!("{name} is missing")
 }
 
-/// The values of an entry, or a clause on why there are none.
+/// Returns the values of an entry, or a clause that says why there are none.
 fn fitting(tensors: &HashMap<String, Tensor>, entry: &Entry) -> Result<Vec<f32>, String> {
     let name = &entry.name;
     let tensor = tensors.get(name).ok_or_else(|| missing(name))?;

@@ -1,4 +1,4 @@
-//! The network on an NVIDIA device beside our kernels on the CPU:
+//! Comparison of the network on an NVIDIA device with our kernels on the CPU:
 //! `cargo test --release -p ppa-learn --features cuda --test cuda -- --ignored --nocapture`.
 
 use candle_core::{DType, Device, Tensor};
@@ -32,7 +32,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     length(&differences)
 }
 
-/// What a step gives, and the output in evaluation after it.
+/// Results of a step, and the output in evaluation after it.
 struct Step {
     output: Vec<f64>,
     gradients: Vec<(String, Vec<f64>)>,
@@ -83,7 +83,7 @@ fn a_step_on_the_device_is_that_of_the_cpu() {
     let all = expected.gradients.iter().flat_map(|(_, g)| g.clone());
     let whole = length(&all.collect::<Vec<f64>>());
     for ((name, found), (_, expected)) in found.gradients.iter().zip(&expected.gradients) {
-        // Sums that cancel in f32 err by the gradient of the whole.
+        // Sums that cancel in f32 have errors proportional to the total gradient.
         let allowed = 1e-3 * length(expected) + 1e-5 * whole;
         let error = distance(found, expected);
         assert!(
@@ -93,7 +93,7 @@ fn a_step_on_the_device_is_that_of_the_cpu() {
     }
 }
 
-/// The two networks run on two threads, and the layers behind them on a third.
+/// The two networks run on two threads, and the layers after them on a third.
 #[test]
 #[ignore = "needs an NVIDIA device"]
 fn networks_of_two_cameras_on_the_device_are_those_of_the_cpu() {

@@ -1,4 +1,4 @@
-//! What a new network is and does.
+//! Properties of a new network.
 
 use candle_core::{Device, Storage, Tensor};
 use ppa_learn::{
@@ -157,7 +157,7 @@ fn statistics_become_the_mean_of_those_of_the_batches() {
     };
     let [first, second] = &batches;
     let alone = [first, second].map(|batch| after(&network(plain), &[batch]));
-    // What was there before is forgotten, and no branch is left out.
+    // Previous statistics are forgotten, and no branch is dropped.
     let used = network(Options::default());
     gradient(&used, first, 0);
     let found = after(&used, &[first, second]);
@@ -168,7 +168,7 @@ fn statistics_become_the_mean_of_those_of_the_batches() {
             "{found}, expected {mean}"
         );
     }
-    // Training moves them by a tenth from means 0 and variances 1.
+    // Training changes them by a tenth from means 0 and variances 1.
     let trained = network(plain);
     gradient(&trained, first, 0);
     let initial = statistics(&network(plain));

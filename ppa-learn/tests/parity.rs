@@ -75,7 +75,7 @@ fn loss(network: &EfficientNetB0, io: &HashMap<String, Tensor>) -> (f64, GradSto
 #[ignore = "needs the reference values of PyTorch in PPA_SHARED"]
 fn evaluation_is_that_of_pytorch() {
     let (network, io) = (network(), tensors("b0_seed1_io.safetensors"));
-    // PyTorch computed the second one in `f32`: both round, and ours depends on the processor's vector instructions.
+    // PyTorch computed the second one in `f32`: both have rounding errors, and ours depend on the processor's vector instructions.
     for (input, expected, tolerance) in [
         ("input", "eval_output_f64", 1e-5),
         ("extra0_input", "extra0_eval_output", 3e-5),

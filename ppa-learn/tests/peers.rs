@@ -1,6 +1,6 @@
-//! Weights as PyTorch and onnxruntime read and write them, and scalars as TensorBoard reads them.
+//! Exchange of weights with PyTorch and onnxruntime, and of scalars with TensorBoard.
 //!
-//! By hand only, with a Python that has torch, torchvision, onnx, onnxruntime, safetensors, numpy and tensorboard:
+//! Run manually, with a Python that has torch, torchvision, onnx, onnxruntime, safetensors, numpy and tensorboard:
 //! `PPA_PYTHON=python cargo test -p ppa-learn --features peers --test peers`.
 
 #[path = "it/toy.rs"]
@@ -28,7 +28,7 @@ fn values(network: &EfficientNetB0) -> Vec<Vec<f32>> {
         .collect()
 }
 
-/// Runs `script` with the arguments, in the Python that PPA_PYTHON names.
+/// Runs `script` with the arguments, using the Python named by PPA_PYTHON.
 fn python(script: &str, arguments: &[&std::path::Path]) {
     let program = std::env::var_os("PPA_PYTHON").expect("PPA_PYTHON names a Python");
     let out = std::process::Command::new(program)
@@ -45,7 +45,7 @@ fn python(script: &str, arguments: &[&std::path::Path]) {
     );
 }
 
-/// Passes in training after which running statistics are those of [`images`], so that answers follow the image.
+/// Number of training passes after which running statistics are those of [`images`], so that predictions depend on the image.
 const PASSES: u64 = 150;
 
 /// Noise [count, 1, height, width], the same for the same number; each image of a batch has more contrast than the one before.
@@ -59,7 +59,7 @@ fn images(number: u64, (count, height, width): (usize, usize, usize)) -> Tensor 
     Tensor::from_vec(values, (count, 1, height, width), &Device::Cpu).unwrap()
 }
 
-/// A network whose running statistics are not the first ones, with what it gives for images of odd sides.
+/// A network whose running statistics are not the initial ones, with its outputs for images of odd sides.
 fn exported(folder: &std::path::Path) -> (EfficientNetB0, std::path::PathBuf) {
     let one = EfficientNetB0::new(1, Options::default()).unwrap();
     for step in 0..PASSES {
@@ -204,7 +204,7 @@ torch.save(model.state_dict(), sys.argv[3])
     assert_eq!(values(&network), values(&other));
 }
 
-/// Modules of the authors' names and semantics, in evaluation.
+/// Modules with the authors' names and semantics, in evaluation.
 const FUSED: &str = "
 import sys, torch, torchvision
 from safetensors.torch import load_file

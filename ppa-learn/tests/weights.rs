@@ -1,4 +1,4 @@
-//! Weight files: what is written is read, what does not fit is named, and nothing that a file holds can break the reader.
+//! Weight files: round trips, error messages for tensors that do not fit, and robustness against any file content.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -46,7 +46,7 @@ fn saved_weights_are_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("weights.safetensors");
     let (one, other) = (network(1), network(2));
-    // Also running statistics that are not the first ones.
+    // Also running statistics other than the initial ones.
     let images = Tensor::rand(0.0_f32, 1.0, (4, 1, 40, 40), &Device::Cpu).unwrap();
     one.forward(&images, Mode::Train { step: 0 }).unwrap();
     one.save(&path).unwrap();
@@ -108,7 +108,7 @@ fn networks_of_both_cameras_are_saved_and_loaded() {
         let [found, features] = [found, &features].map(|t| t.to_vec2::<f32>().unwrap());
         assert_eq!(found, features);
 
-        // Half of a pair is none.
+        // A file that lacks a tensor of the pair is refused.
         let mut tensors = candle_core::safetensors::load(&fused, &Device::Cpu).unwrap();
         let name = if shared_weights {
             "fc.0.bias"
@@ -126,7 +126,7 @@ fn networks_of_both_cameras_are_saved_and_loaded() {
         let expected = format!("{name} is missing; not in the network: {name}s");
         assert!(error.ends_with(&expected), "{error}");
         assert_eq!(say(&other), before);
-        // Beyond the network, behind a camera's prefix and without one.
+        // Unknown names, with a camera's prefix and without one.
         let of_it = tensors.remove(&format!("{name}s")).unwrap();
         tensors.insert(name.to_owned(), of_it);
         for more in ["cam_right_module.more", "more"] {
@@ -265,7 +265,7 @@ fn what_is_no_weight_file_is_reported_by_its_name() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// A file cut short, lengthened, or with other bytes in its header gives an error or weights, and never a panic.
+    /// A truncated or lengthened file, or one with changed header bytes, gives an error or weights, but never a panic.
     #[test]
     fn a_corrupt_file_is_an_error(cut in 0_usize..60_000, flips in prop::collection::vec((0_usize..30_000, any::<u8>()), 0..4)) {
         thread_local! {

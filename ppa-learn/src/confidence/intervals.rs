@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 const MIN_POSES_PER_BIN: usize = 50;
 /// Maximum number of bins: more would fit noise.
 const MAX_BINS: usize = 5;
-/// Relative error of floating-point numbers before a rounding up: 0.9 (9 + 1) is 9, not slightly more.
+/// Relative tolerance for floating-point errors when rounding up: 0.9 (9 + 1) is 9, not slightly more.
 const ROUNDING: f64 = 1e-12;
 /// Range of the quality.
 const QUALITY: [f64; 2] = [1.0, 3.0];
 
-/// Why there are no intervals.
+/// Error of a calibration of intervals.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfidenceError {
@@ -25,11 +25,11 @@ pub enum ConfidenceError {
         "{found} calibration poses, expected at least {expected} for intervals of coverage {coverage}"
     )]
     TooFew {
-        /// Poses of calibration.
+        /// Number of calibration poses.
         found: usize,
-        /// Minimum number.
+        /// Minimum number of poses.
         expected: usize,
-        /// Of the intervals.
+        /// Coverage of the intervals.
         coverage: f64,
     },
     /// A label or a prediction that is not finite.
@@ -37,34 +37,34 @@ pub enum ConfidenceError {
     NotFinite,
 }
 
-/// Half widths of the intervals of predictions, by prediction.
+/// Half widths of prediction intervals, by prediction.
 ///
 /// Split conformal prediction (Lei et al. 2018): the half width is the ⌈(n + 1) coverage⌉-th smallest absolute error of n poses that the
-/// network was not trained with. The interval then contains the label of a further pose with at least the coverage as its probability,
-/// provided that the poses are exchangeable. Poses of one person are alike, so that it holds for few persons approximately;
-/// [`coverage_of_left_out`] shows how well. Bins of the prediction have half widths of their own (Mondrian conformal
-/// prediction, Vovk et al. 2003), as errors in the middle of the scale are larger than at its ends.
+/// network was not trained with. The interval then contains the label of a new pose with a probability of at least the coverage,
+/// provided that the poses are exchangeable. Poses of one person are alike, so for few persons this holds only approximately;
+/// [`coverage_of_left_out`] shows how well. Each bin of predictions has its own half width (Mondrian conformal
+/// prediction, Vovk et al. 2003), because errors in the middle of the scale are larger than at its ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intervals {
     /// Probability that an interval contains the label.
     pub coverage: f64,
-    /// In order of predictions.
+    /// Bins in the order of their predictions.
     pub bins: Vec<IntervalBin>,
 }
 
-/// Predictions with one half width.
+/// Range of predictions that share one half width.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct IntervalBin {
     /// Greatest prediction of the bin; the last bin holds all greater ones as well.
     pub to: f64,
     /// Half width of the interval.
     pub half_width: f64,
-    /// Poses of calibration.
+    /// Number of calibration poses.
     pub poses: usize,
 }
 
 impl Intervals {
-    /// Intervals of some coverage from (label, prediction) of poses that the network was not trained with.
+    /// Computes intervals of the given coverage from (label, prediction) of poses that the network was not trained with.
     ///
     /// # Errors
     /// [`ConfidenceError`].
@@ -101,7 +101,7 @@ impl Intervals {
         }
     }
 
-    /// Lower and upper limit of the label of a prediction, within 1 to 3.
+    /// Returns the lower and upper limits of the label for a prediction, clamped to 1 to 3.
     pub fn interval(&self, prediction: f64) -> [f64; 2] {
         let place = self.bins.partition_point(|bin| bin.to < prediction);
         let bin = self.bins[place.min(self.bins.len() - 1)];
@@ -110,7 +110,7 @@ impl Intervals {
     }
 }
 
-/// The ⌈(n + 1) coverage⌉-th smallest of n values; none if there are too few.
+/// Returns the ⌈(n + 1) coverage⌉-th smallest of n values; `None` if there are too few.
 pub(super) fn conformal_quantile(values: impl Iterator<Item = f64>, coverage: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
@@ -118,8 +118,8 @@ pub(super) fn conformal_quantile(values: impl Iterator<Item = f64>, coverage: f6
     values.get(rank.checked_sub(1)?).copied()
 }
 
-/// The share of poses whose label lies in the interval that the poses of all other persons give, from (person, label, prediction): what the
-/// coverage is for a new person. None for one person, or too few poses of others.
+/// Returns the share of poses (person, label, prediction) whose label is in the interval calibrated on all other persons: an estimate of
+/// the coverage for a new person. `None` for a single person, or if the others have too few poses.
 pub fn coverage_of_left_out<P: Ord + Copy>(poses: &[(P, f64, f64)], coverage: f64) -> Option<f64> {
     let mut persons: BTreeMap<P, Vec<(f64, f64)>> = BTreeMap::new();
     for &(person, label, prediction) in poses {

@@ -1,5 +1,5 @@
-//! How far predictions can be trusted: intervals that contain the label of a new pose with a stated probability, and detection of
-//! images outside the distribution of the training images.
+//! Confidence of predictions: intervals that contain the label of a new pose with a stated probability, and detection of images
+//! outside the distribution of the training images.
 
 mod intervals;
 mod neighbours;

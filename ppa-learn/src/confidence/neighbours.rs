@@ -1,25 +1,25 @@
-//! Distance of an image's descriptor from those of training images.
+//! Distance of an image's descriptor from the descriptors of training images.
 
 use super::intervals::conformal_quantile;
 
-/// The k of the k-th nearest neighbour: with k above 1, a single odd training image does not let others like it pass.
+/// The k of the k-th nearest neighbour: with k above 1, one outlier among the training images does not let similar images pass.
 const NEIGHBOUR: usize = 5;
 
-/// One descriptor of all training images, and the limit of the Euclidean distance to the fifth nearest of them.
+/// One descriptor of every training image, and a limit on the Euclidean distance to the fifth nearest of them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Neighbours {
     /// Descriptors of training images, one after the other.
     pub references: Vec<f32>,
-    /// Number of values of each.
+    /// Number of values of each descriptor.
     pub size: usize,
     /// Distance that the stated share of calibration images does not exceed.
     pub limit: f32,
 }
 
 impl Neighbours {
-    /// From descriptors of training images and of calibration images, of which a share of `coverage` does not exceed the limit.
+    /// Sets the limit to the distance that a share of `coverage` of the calibration images (`others`) does not exceed.
     ///
-    /// None for too few images: fewer of training than the neighbour's number, or than coverage / (1 − coverage) of calibration.
+    /// `None` for too few images: fewer than five training images, or than coverage / (1 − coverage) calibration images.
     pub fn new(training: &[&[f32]], others: &[&[f32]], coverage: f64) -> Option<Self> {
         let mut neighbours = Self {
             references: training.concat(),
@@ -34,15 +34,15 @@ impl Neighbours {
         Some(neighbours)
     }
 
-    /// Whether there are enough references for the distance to the fifth neighbour.
+    /// Returns whether there are enough references for the distance to the fifth neighbour.
     pub fn are_enough(&self) -> bool {
         self.size > 0 && self.references.len() >= NEIGHBOUR * self.size
     }
 
-    /// Distance of a descriptor as a share of the limit.
+    /// Returns the distance of a descriptor as a share of the limit.
     ///
     /// # Panics
-    /// If it has another length than those of training images.
+    /// If its length differs from that of the training descriptors.
     pub fn relative_distance(&self, own: &[f32]) -> f32 {
         self.distance(own) / self.limit
     }

@@ -3,28 +3,28 @@
 use super::neighbours::Neighbours;
 use crate::network::FEATURES;
 
-/// Blocks in each direction of an image whose mean values describe it.
+/// Number of blocks in each direction of an image; their mean values describe it.
 const BLOCKS: usize = 8;
 
-/// Descriptors of one image, which the detector compares.
+/// Descriptors of one image for [`OutOfDistributionDetector`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Descriptors {
-    /// The network's features, at length 1.
+    /// The network's features, normalised to length 1.
     pub(crate) features: Vec<f32>,
     /// Mean values of blocks of the network's input.
     pub(crate) blocks: Vec<f32>,
 }
 
 impl Descriptors {
-    /// Number of values in features and in blocks, of images of `side` x `side` pixels.
+    /// Returns the number of features and of blocks for images of `side` x `side` pixels.
     pub(crate) fn sizes(side: usize) -> [usize; 2] {
         [FEATURES, BLOCKS.min(side).pow(2)]
     }
 
-    /// From the network's features and its square input of `side` x `side` values.
+    /// Computes the descriptors from the network's features and its square input of `side` x `side` values.
     ///
     /// # Panics
-    /// If the input is not of that side.
+    /// If the input does not have `side` x `side` values.
     pub fn new(features: &[f32], input: &[f32], side: usize) -> Self {
         assert_eq!(input.len(), side * side, "a square input");
         let length = features.iter().map(|x| x * x).sum::<f32>().sqrt();
@@ -36,10 +36,10 @@ impl Descriptors {
     }
 }
 
-/// Detector of images of one camera unlike the training images, by the distance of two descriptors from theirs:
+/// Detector of images of one camera that are unlike the training images, by the distances of two descriptors:
 ///
 /// * the network's features at length 1 (Sun et al., ICML 2022, "Out-of-distribution detection with deep nearest neighbors");
-/// * the mean depths of 8 x 8 blocks, as a network that was trained on limbs only may give a plain wall the features of some limb.
+/// * the mean depths of 8 x 8 blocks, because a network trained only on limbs may give a plain wall the features of a limb.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutOfDistributionDetector {
     pub(crate) features: Neighbours,
@@ -47,13 +47,13 @@ pub struct OutOfDistributionDetector {
 }
 
 impl OutOfDistributionDetector {
-    /// From training images and images of calibration that the network was not trained with. Each descriptor's limit is the distance that
-    /// a share of `coverage` of the calibration images does not exceed.
+    /// Builds a detector from training images and from calibration images that the network was not trained with. Each descriptor's limit is
+    /// the distance that a share of `coverage` of the calibration images does not exceed.
     ///
-    /// None for too few images: fewer than five of training, or than coverage / (1 − coverage) of calibration.
+    /// `None` for too few images: fewer than five training images, or than coverage / (1 − coverage) calibration images.
     ///
     /// # Panics
-    /// If they are of different networks.
+    /// If the descriptors are of different networks.
     pub fn new(
         training: &[Descriptors],
         calibration: &[Descriptors],
@@ -70,11 +70,11 @@ impl OutOfDistributionDetector {
         })
     }
 
-    /// Distance of an image from the training images as a share of the limit, the larger one of both descriptors. Above 1, the image is out
-    /// of distribution.
+    /// Returns the distance of an image from the training images as a share of the limit, the larger one of the two descriptors. An image
+    /// above 1 is out of distribution.
     ///
     /// # Panics
-    /// If it is of another network.
+    /// If the descriptors are of another network.
     pub fn relative_distance(&self, image: &Descriptors) -> f32 {
         let of_features = self.features.relative_distance(&image.features);
         of_features.max(self.blocks.relative_distance(&image.blocks))
@@ -98,7 +98,7 @@ fn blocks(input: &[f32], side: usize) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// A direction in a plane, and an image of one depth.
+    /// Features that point in a direction of a plane, and an image of uniform depth.
     fn image(degrees: f32, depth: f32) -> Descriptors {
         let (sin, cos) = degrees.to_radians().sin_cos();
         Descriptors::new(&[3.0 * cos, 3.0 * sin], &[depth; 100], 10)

@@ -1,4 +1,4 @@
-//! The six augmentations of training.
+//! The six augmentations used in training.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,10 +14,10 @@ use super::rotate::rotate;
 
 /// Sides of the box filter.
 const BLUR_SIDES: [usize; 3] = [3, 5, 7];
-/// How training images are changed, in this order: mirroring, rotation, noise, blur, removal of pixels at depth edges, and cropping to a
-/// square whose side lies between the network's and the prepared image's. The default is the paper's.
+/// Augmentation of training images, in this order: mirroring, rotation, noise, blur, removal of pixels at depth edges, and cropping to a
+/// square whose side is between that of the network's input and that of the prepared image. The default is the paper's.
 ///
-/// Semantics follow albumentations 1.3.1 as the authors' repository uses it; noise and blur change invalid pixels as well.
+/// The semantics are those of albumentations 1.3.1 as used in the authors' repository; noise and blur also change invalid pixels.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Augmentation {
@@ -25,15 +25,15 @@ pub struct Augmentation {
     pub flip_probability: f64,
     /// Probability of rotation.
     pub rotate_probability: f64,
-    /// Greatest angle in degrees, to either side; angles are uniform.
+    /// Largest rotation angle in degrees in either direction; angles are uniformly distributed.
     pub rotate_limit_deg: f64,
     /// Probability of noise.
     pub noise_probability: f64,
-    /// Greatest variance of the Gaussian noise, as a share of the range squared; variances are uniform.
+    /// Largest variance of the Gaussian noise, as a share of the range squared; variances are uniformly distributed.
     pub noise_max_variance: f64,
-    /// Probability of a box filter of side 3, 5 or 7.
+    /// Probability of blurring with a box filter of side 3, 5 or 7.
     pub blur_probability: f64,
-    /// Probability of invalid pixels at depth edges.
+    /// Probability of making pixels at depth edges invalid.
     pub invalid_probability: f64,
 }
 
@@ -52,13 +52,13 @@ impl Default for Augmentation {
 }
 
 impl Augmentation {
-    /// Prepared images (mm) of the cameras of one pose as the network sees them in training, `side * side` values each.
+    /// Augments the prepared images (mm) of the cameras of one pose and returns network inputs of `side * side` values each.
     ///
-    /// All cameras are changed in the same way, noise included; the lost pixels are different for each. `seed` and `index` name the
-    /// random numbers: equal ones give equal images.
+    /// All cameras get the same changes, including the noise, except that each loses different pixels. `seed` and `index` select the
+    /// random numbers: equal values give equal images.
     ///
     /// # Panics
-    /// If an image is not of [`prepared_side`], or `side` is less than 6, or a probability is not in [0, 1].
+    /// If the side of an image is not [`prepared_side`], `side` is less than 6, or a probability is not in [0, 1].
     pub fn apply(
         &self,
         prepared_mm: &[&Raster<u16>],
@@ -105,7 +105,7 @@ impl Augmentation {
     }
 }
 
-/// One draw of all parameters.
+/// Parameters drawn for one sample.
 struct Change {
     flip: bool,
     turn_deg: Option<f64>,
@@ -163,7 +163,7 @@ mod tests {
         (0..DRAWS).map(draw).collect()
     }
 
-    /// Standard errors between the mean of some numbers and what it should be, where each has this variance.
+    /// Deviation of the mean of `numbers` from `mean`, in standard errors, if each number has this variance.
     fn z(numbers: &[f64], mean: f64, variance: f64) -> f64 {
         let n = numbers.len() as f64;
         (numbers.iter().sum::<f64>() / n - mean) / (variance / n).sqrt()
@@ -179,7 +179,7 @@ mod tests {
         let angles: Vec<f64> = draws.iter().filter_map(|d| d.turn_deg).collect();
         assert!(angles.iter().all(|angle| angle.abs() <= 15.0));
         let squares: Vec<f64> = angles.iter().map(|angle| angle * angle).collect();
-        // Variance of the noise per image, uniform on [0, 10⁻³]; its estimate from 36² pixels spreads by 2/36² of its square.
+        // Variance of the noise per image, uniform on [0, 10⁻³]; its estimate from 36² pixels has a relative variance of 2/36².
         let variances: Vec<f64> = draws
             .iter()
             .filter_map(|d| d.noise.as_ref())

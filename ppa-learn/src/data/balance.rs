@@ -1,4 +1,4 @@
-//! Sampling for training: rare labels are drawn as often as others, or all samples with equal probability.
+//! Sampling for training: either balanced over the labels or with equal probability for all samples.
 
 use rand::RngExt;
 
@@ -7,10 +7,10 @@ use crate::random::{Purpose, stream};
 use super::error::DataError;
 use super::sample::Sample;
 
-/// Buckets between labels 1 and 3, all of one width; the last one holds label 3 as well.
+/// Number of buckets of equal width between labels 1 and 3; the last one includes label 3.
 pub const BUCKETS: usize = 9;
 
-/// Which bucket a label falls into; None for labels outside 1 to 3.
+/// Returns the bucket of a label; `None` for labels outside 1 to 3.
 pub fn bucket(label: f64) -> Option<usize> {
     let edge = |i: usize| 1.0 + i as f64 * (2.0 / BUCKETS as f64);
     (1.0..=3.0)
@@ -18,8 +18,8 @@ pub fn bucket(label: f64) -> Option<usize> {
         .then(|| (1..BUCKETS).filter(|&i| edge(i) <= label).count())
 }
 
-/// Samples by bucket: draws a bucket that is not empty, then one of its samples, both evenly and with replacement. Unbalanced samples
-/// are one bucket.
+/// Samples by bucket: draws a nonempty bucket, then one of its samples, both uniformly and with replacement. Unbalanced samples are in
+/// a single bucket.
 #[derive(Debug, Clone)]
 pub struct Balanced {
     buckets: Vec<Vec<usize>>,
@@ -46,7 +46,7 @@ impl Balanced {
         Ok(Self { buckets })
     }
 
-    /// The same without balance: all samples are drawn alike.
+    /// Removes the balance: all samples are drawn with equal probability.
     #[must_use]
     pub fn unbalanced(self) -> Self {
         let mut all = self.buckets.concat();
@@ -54,7 +54,7 @@ impl Balanced {
         Self { buckets: vec![all] }
     }
 
-    /// The place of the sample that stands at `index` of the endless sequence of `seed`.
+    /// Returns the number of the sample at `index` in the endless sequence of `seed`.
     pub fn pick(&self, seed: u64, index: u64) -> usize {
         let mut random = stream(seed, Purpose::Sampling, index);
         let bucket = &self.buckets[random.random_range(0..self.buckets.len())];

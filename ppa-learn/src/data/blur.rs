@@ -2,10 +2,10 @@
 
 use super::raster::Raster;
 
-/// Mean over squares of `side` x `side` pixels around each pixel; the image is mirrored about its outermost pixels.
+/// Averages over the square of `side` x `side` pixels around each pixel; the image is mirrored about its outermost pixels.
 ///
 /// # Panics
-/// If `side` is even, or the image has less than `side` columns or rows.
+/// If `side` is even, or the image has fewer than `side` columns or rows.
 pub fn box_blur(image: &Raster<f32>, side: usize) -> Raster<f32> {
     assert!(side % 2 == 1, "a box has a pixel in its middle");
     let (width, height) = (image.width(), image.height());
@@ -38,7 +38,7 @@ pub fn box_blur(image: &Raster<f32>, side: usize) -> Raster<f32> {
     })
 }
 
-/// Place of element `i` of a side that is continued by `radius` mirrored elements at both ends.
+/// Returns the source index of element `i` of a row that is extended by `radius` mirrored elements at both ends.
 pub(super) fn mirrored(i: usize, radius: usize, length: usize) -> usize {
     let place = i.abs_diff(radius);
     let last = length - 1;

@@ -1,4 +1,4 @@
-//! The rotation that would bring a limb from a pose into its best one.
+//! The rotation from a pose to the best pose of the limb.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use super::sample::Sample;
 /// The label of an inadequate pose.
 const INADEQUATE: f64 = 3.0;
 
-/// Sets each sample's [`correction_deg`](Sample::correction_deg): the best angle of its limb less its own angle.
+/// Sets each sample's [`correction_deg`](Sample::correction_deg): the best angle of its limb minus its own angle.
 ///
-/// The best angle is the mean of the angles of the limb's samples, weighted by how much better than inadequate each is labelled: the
-/// centre of the range of good poses, if angles are evenly spaced and cover it.
+/// The best angle is the mean of the angles of the limb's samples, weighted by 3 (inadequate) minus the label: the centre of the
+/// range of good poses if the angles are evenly spaced and cover it.
 pub(super) fn set_corrections(samples: &mut [Sample]) {
     let mut sums: BTreeMap<LimbId, [f64; 2]> = BTreeMap::new();
     for sample in samples.iter() {

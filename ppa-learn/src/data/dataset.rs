@@ -17,25 +17,25 @@ use super::prepare::check_roi;
 use super::sample::{Sample, SampleImage};
 use super::size::size_of;
 
-/// Frames that are used of a recorded pose, the first ones in time that both cameras have: the paper's number.
+/// Number of frames used per recorded pose, as in the paper: the first ones in time that both cameras have.
 pub const FRAMES_PER_POSE: usize = 5;
 
-/// Which images make a sample.
+/// Images that make up a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Views {
-    /// The left camera's images, one per sample: for the paper's network of the first view.
+    /// The left camera's images, one per sample: for the paper's network for the first view.
     Left,
     /// The right camera's images, one per sample.
     Right,
-    /// Images of both cameras, one per sample: a network of a unified view.
+    /// Images of both cameras, one per sample: for a network of a unified view.
     Unified,
-    /// The images of both cameras of one moment together: for networks that fuse both.
+    /// Both cameras' images of one moment together: for networks that fuse them.
     Pairs,
 }
 
 impl fmt::Display for Views {
-    /// As in configurations.
+    /// Writes the name used in configurations.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Left => "left",
@@ -46,7 +46,7 @@ impl fmt::Display for Views {
     }
 }
 
-/// Which samples of a dataset are used, and how limbs of both sides are shown.
+/// Selection of the samples of a dataset, and how left limbs are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Selection<'a> {
     /// Numbers of the persons; all of them if `None`.
@@ -55,21 +55,21 @@ pub struct Selection<'a> {
     pub shapes: Option<&'a [BodyShape]>,
     /// Every n-th angle of each limb's rotated poses, from the smallest; all of them if `None`.
     pub every_pose: Option<NonZeroUsize>,
-    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if `None`.
+    /// NAME of the label file `labels.NAME.json`; `labels.json` if `None`.
     pub labels: Option<&'a LabelName>,
-    /// Take images without a label too, with NaN for it; otherwise they are refused.
+    /// Include images without a label, with NaN as their label; otherwise they are an error.
     pub unlabelled: bool,
-    /// Which cameras' images make a sample.
+    /// Cameras whose images make up a sample.
     pub views: Views,
-    /// Frames that are used of a recorded pose.
+    /// Number of frames used per recorded pose.
     pub frames_per_pose: usize,
-    /// Show left limbs as right ones: images mirrored left to right, cameras exchanged. A mirrored left limb before mirrored
-    /// cameras is a right one before the cameras as they are.
+    /// Show left limbs as right ones: images mirrored left to right, cameras exchanged. A mirrored left limb in front of mirrored
+    /// cameras is a right limb in front of the actual cameras.
     pub mirror: bool,
 }
 
 impl Selection<'_> {
-    /// Everything of some views, limbs as they are.
+    /// Selects all labelled samples of `views`, without mirroring.
     pub fn all(views: Views) -> Self {
         Self {
             patients: None,
@@ -83,18 +83,18 @@ impl Selection<'_> {
         }
     }
 
-    /// Whether the images of a limb are mirrored.
+    /// Returns whether the images of a limb are mirrored.
     fn mirrors(&self, limb: LimbId) -> bool {
         self.mirror && limb.side == Side::Left
     }
 }
 
-/// The samples of a dataset that are selected, in the order of the dataset.
+/// Returns the selected samples of a dataset, in the order of the dataset.
 ///
 /// # Errors
-/// [`DataError`] for a folder that is not a dataset, an image without label (unless [`Selection::unlabelled`]), without region or with one outside its camera's images, one
-/// that is no 16-bit PNG of the size of the others of its camera, as far as headers show, a person or body shape that is not there, or
-/// no image.
+/// [`DataError`] for a folder that is not a dataset, an image without a label (unless [`Selection::unlabelled`]), without a region or
+/// with one outside its camera's images, an image that according to its header is not a 16-bit PNG of the size of the others of its
+/// camera, a missing person or body shape, or no image.
 pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, DataError> {
     let Selection {
         patients: persons,
@@ -174,7 +174,7 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
     Ok(samples)
 }
 
-/// The angles of rotated poses that a selection uses.
+/// Angles of rotated poses that a selection uses.
 struct EveryAngle {
     every: usize,
     /// Steps of each limb's rotated poses.
@@ -213,8 +213,8 @@ fn other(view: View) -> View {
     }
 }
 
-/// The moments of a pose to take frames from, in order of time: those that both cameras have, so that frames of equal numbers
-/// show one moment; all of them where there is none, as with a single camera.
+/// Returns the moments of a pose to take frames from, in order of time: those that both cameras have, so that frames of equal
+/// number show one moment; all of them if there is no such moment, as with a single camera.
 fn moments<'a>(pose: &'a [&ImagePair]) -> impl Iterator<Item = &'a &'a ImagePair> {
     let both = |pair: &ImagePair| View::ALL.iter().all(|&view| pair.depth(view).is_some());
     let any = pose.iter().any(|pair| both(pair));
@@ -225,14 +225,14 @@ struct Reader<'a> {
     dataset: &'a Published,
     labels: Option<&'a LabelName>,
     unlabelled: bool,
-    /// The canonical path of the dataset's folder, however it was spelled: persons of one dataset must be recognised.
+    /// Canonical path of the dataset's folder, so that persons of one dataset are recognised however the path is written.
     place: PathBuf,
     /// Columns and rows of each camera's first image.
     sizes: BTreeMap<View, [usize; 2]>,
 }
 
 impl Reader<'_> {
-    /// The sample of some cameras, all of which the pair has.
+    /// Returns the sample of the given cameras, all of which must be in the pair.
     fn sample(
         &mut self,
         pair: &ImagePair,
@@ -313,7 +313,7 @@ impl Reader<'_> {
     }
 }
 
-/// The body shape of a rotated pose; recorded ones have none.
+/// Returns the body shape of a rotated pose; recorded poses have none.
 fn shape_of(pair: &ImagePair) -> Option<BodyShape> {
     match pair.pose {
         Pose::Rotated { shape, .. } => Some(shape),
@@ -321,7 +321,7 @@ fn shape_of(pair: &ImagePair) -> Option<BodyShape> {
     }
 }
 
-/// Person, side and pose, without camera and frame.
+/// Returns person, side and pose as text, without camera and frame.
 fn pose_name(pair: &ImagePair) -> String {
     let limb = format!("patient_{}/{}", pair.limb.patient, pair.limb.side_letter());
     match pair.pose {

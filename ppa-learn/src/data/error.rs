@@ -1,14 +1,14 @@
-//! Errors of images, labels and splits.
+//! Errors in images, labels and splits.
 
 use std::path::PathBuf;
 
 use ppa_dataset::published::{ImageFileError, PublishedError};
 
-/// Images, regions, labels or splits that cannot be used.
+/// Error in images, regions, labels or splits.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataError {
-    /// The number of values is not columns times rows, or there is none.
+    /// The number of values is not columns times rows, or is 0.
     #[error("an image of {width} x {height} pixels has {found} values")]
     Length {
         /// Columns.
@@ -39,10 +39,10 @@ pub enum DataError {
     Region {
         /// The image.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: Box<DataError>,
     },
-    /// An image of another size than the others of its camera.
+    /// An image whose size differs from that of the other images of its camera.
     #[error("{} has {}x{} pixels, expected {}x{} as in the other images of its camera", path.display(), found[0], found[1], expected[0], expected[1])]
     Size {
         /// The image.
@@ -60,10 +60,10 @@ pub enum DataError {
     NoLabel {
         /// The image.
         image: PathBuf,
-        /// Name of the file of labels.
+        /// Name of the label file.
         labels: String,
     },
-    /// A label beyond the scale.
+    /// A label outside the scale.
     #[error("{sample} has the label {label}, expected 1 to 3")]
     Label {
         /// The sample.

@@ -3,10 +3,10 @@
 use super::blur::mirrored;
 use super::raster::Raster;
 
-/// Greater of the absolute values of the two 3 x 3 Sobel derivatives; the image is mirrored about its outermost pixels.
+/// Returns the larger absolute value of the two 3 x 3 Sobel derivatives; the image is mirrored about its outermost pixels.
 ///
 /// # Panics
-/// If the image has less than 2 columns or rows.
+/// If the image has fewer than 2 columns or rows.
 pub fn gradient(image: &Raster<f32>) -> Raster<f64> {
     let (width, height) = (image.width(), image.height());
     assert!(width.min(height) >= 2, "a derivative needs two pixels");
@@ -28,7 +28,7 @@ pub fn gradient(image: &Raster<f32>) -> Raster<f64> {
     })
 }
 
-/// The `share` quantile of some numbers, linear between the two nearest ranks.
+/// Returns the `share` quantile of `numbers`, with linear interpolation between the two nearest ranks.
 ///
 /// # Panics
 /// If there are no numbers, or `share` is not in [0, 1].

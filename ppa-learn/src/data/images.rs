@@ -1,4 +1,4 @@
-//! Prepared images of samples: read when they are first needed, then kept as far as memory is allowed.
+//! Prepared images of samples, read when first needed and cached up to a memory limit.
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -19,10 +19,10 @@ pub struct Images {
 }
 
 impl Images {
-    /// Samples for a network of `side` x `side` inputs; up to `keep_bytes` of prepared images stay in memory.
+    /// Takes samples for a network of `side` x `side` inputs; keeps up to `keep_bytes` of prepared images in memory.
     ///
     /// # Errors
-    /// [`DataError::Empty`] for no sample.
+    /// [`DataError::Empty`] if there are no samples.
     pub fn new(samples: Vec<Sample>, side: usize, keep_bytes: usize) -> Result<Self, DataError> {
         if samples.is_empty() {
             return Err(DataError::Empty("to load".into()));
@@ -35,17 +35,17 @@ impl Images {
         })
     }
 
-    /// The samples.
+    /// Returns the samples.
     pub fn samples(&self) -> &[Sample] {
         &self.samples
     }
 
-    /// Columns and rows that the network sees.
+    /// Returns the columns and rows of the network's input.
     pub fn side(&self) -> usize {
         self.side
     }
 
-    /// The prepared images of a sample, one for each camera.
+    /// Returns the prepared images of a sample, one for each camera.
     ///
     /// # Errors
     /// [`DataError`] naming the file that cannot be used.

@@ -1,4 +1,4 @@
-//! Batches made ahead by worker threads, in an order that does not depend on them.
+//! Batches prepared by worker threads, in an order that does not depend on the threads.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -12,34 +12,34 @@ use super::images::Images;
 use super::prepare::evaluation_input;
 use super::sample::Sample;
 
-/// Batches that each worker makes ahead.
+/// Number of batches that each worker prepares in advance.
 const AHEAD: usize = 2;
 
-/// What a network gets at once.
+/// Batch of network inputs and labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch {
-    /// Places of the samples in the list of samples.
+    /// Indices of the samples in the list of samples.
     pub samples: Vec<usize>,
-    /// For each camera of a sample `samples.len() * side * side` values in [−0.5, 0.5].
+    /// `samples.len() * side * side` values in [−0.5, 0.5] for each camera.
     pub images: Vec<Vec<f32>>,
     /// One label for each sample.
     pub labels: Vec<f32>,
-    /// Medial rotation in degrees to the best pose of the limb, where it is known.
+    /// Medial rotation in degrees to the best pose of the limb, if known.
     pub corrections_deg: Vec<Option<f32>>,
 }
 
-/// Which samples stand in which batch.
+/// Order in which samples fill the batches.
 #[derive(Debug, Clone)]
 pub enum Order {
-    /// Endless, drawn at random.
+    /// Endless random sequence.
     Training {
         /// How samples are drawn.
         balanced: Balanced,
-        /// How images are changed; as evaluation sees them if left out.
+        /// Augmentation; `None` gives the images as in evaluation.
         augmentation: Option<Augmentation>,
-        /// Names, with the place in the sequence, all random numbers.
+        /// Seed; together with the position in the sequence, it determines all random numbers.
         seed: u64,
-        /// Number of the first batch; a training that continues begins where it stopped.
+        /// Number of the first batch; a resumed training run begins where it stopped.
         first_batch: u64,
     },
     /// Each sample once, in order; the last batch may be short.
@@ -48,7 +48,7 @@ pub enum Order {
     Listed(Vec<usize>),
 }
 
-/// An iterator over batches that worker threads make ahead; it ends the threads when it is dropped.
+/// Iterator over batches that worker threads prepare in advance; dropping it ends the threads.
 #[derive(Debug)]
 pub struct Loader {
     /// Worker w of W makes the batches w, w + W, w + 2 W …
@@ -57,10 +57,10 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// Begins to load batches of `batch_size` samples with some worker threads.
+    /// Starts loading batches of `batch_size` samples with `workers` threads.
     ///
     /// # Panics
-    /// If no thread can be made.
+    /// If a thread cannot be started.
     pub fn new(
         images: &Arc<Images>,
         order: &Order,
@@ -105,7 +105,7 @@ struct Maker {
 }
 
 impl Maker {
-    /// Sends every `step`th batch until there is no more, one failed, or nobody listens.
+    /// Sends every `step`th batch until there are no more, one fails, or the receiver is gone.
     fn send(&self, worker: usize, step: usize, listener: &SyncSender<Result<Batch, DataError>>) {
         for number in (worker..).step_by(step) {
             let Some(batch) = self.batch(number as u64).transpose() else {
@@ -120,7 +120,7 @@ impl Maker {
 
     fn batch(&self, number: u64) -> Result<Option<Batch>, DataError> {
         let size = self.batch_size as u64;
-        // Places in the sequence of samples.
+        // Positions in the sequence of samples.
         let places = match &self.order {
             Order::Training { first_batch, .. } => {
                 let start = (first_batch + number) * size;
@@ -157,7 +157,7 @@ impl Maker {
         Ok(Some(batch))
     }
 
-    /// The sample at a place of the sequence, and what the network sees of each camera's image.
+    /// Returns the sample at a position of the sequence, and the network input of each camera.
     fn inputs(&self, place: u64) -> Result<(usize, Vec<Vec<f32>>), DataError> {
         let side = self.images.side();
         let sample = match &self.order {
@@ -185,7 +185,7 @@ impl Maker {
     }
 }
 
-/// Places of batch `number` in a sequence of `count` samples; none behind its end.
+/// Returns the positions of batch `number` in a sequence of `count` samples; empty after its end.
 fn part(number: u64, size: u64, count: usize) -> std::ops::Range<u64> {
     let end = count as u64;
     (number * size).min(end)..((number + 1) * size).min(end)

@@ -1,4 +1,4 @@
-//! Pixels at depth edges that a training image loses.
+//! Loss of pixels at depth edges of training images.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,10 +8,10 @@ use super::raster::Raster;
 
 /// Only pixels whose gradient is above this quantile of the image's gradients may lose their depth.
 const EDGE_QUANTILE: f64 = 0.998;
-/// Bounds of the share of these pixels that lose it.
+/// Bounds of the share of these pixels that lose their depth.
 const LOST_SHARE: [f64; 2] = [0.1, 0.5];
 
-/// Sets pixels at depth edges to 0, drawn with replacement from the edge pixels.
+/// Sets pixels to 0 that are drawn with replacement from those at depth edges.
 pub fn lose_edge_pixels(image: &mut Raster<f32>, random: &mut ChaCha8Rng) {
     let gradient = gradient(image);
     let threshold = quantile(gradient.values(), EDGE_QUANTILE);
@@ -35,7 +35,7 @@ mod tests {
 
     const DRAWS: u64 = 4000;
 
-    /// Steps between columns, so that the gradient has many values and its quantile is well defined.
+    /// An image with steps between columns, so that the gradient has many values and its quantile is well defined.
     fn stairs() -> Raster<f32> {
         let values = (0..100 * 100).map(|i| ((i % 100) * (i % 97) % 89 + 1) as f32 / 90.0);
         Raster::new(100, 100, values.collect()).unwrap()
@@ -61,7 +61,7 @@ mod tests {
                 places.len() as f64
             })
             .collect();
-        // n uniform on 2..=9 of N = 20 with replacement: N (1 − (1 − 1/N)ⁿ) different ones are expected.
+        // n uniform on 2..=9 draws of N = 20 with replacement: the expected number of distinct pixels is N (1 − (1 − 1/N)ⁿ).
         let n = edges as f64;
         let different = |draws: i32| n * (1.0 - (1.0 - 1.0 / n).powi(draws));
         let mean = (2..10).map(different).sum::<f64>() / 8.0;

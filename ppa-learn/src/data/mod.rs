@@ -1,11 +1,11 @@
-//! From depth images to network input: regions of interest, augmentation, balanced sampling, loading.
+//! Conversion of depth images to network input: regions of interest, augmentation, balanced sampling, loading.
 //!
-//! A 16-bit image in mm is cut to the square around the joint and brought to 1.2 times the network's side
-//! ([`prepare`]); training augments ([`Augmentation`]), evaluation only resizes ([`evaluation_input`]). Depths are divided by
+//! A 16-bit image in mm is cropped to the square around the joint and resized to 1.2 times the side of the network's input
+//! ([`prepare`]); training augments it ([`Augmentation`]), evaluation only resizes it ([`evaluation_input`]). Depths are divided by
 //! [`RANGE_MM`] and shifted by −0.5; invalid pixels are 0 in mm and −0.5 for the network.
 //!
-//! [`read_samples`] lists a dataset of either published layout; [`Loader`] makes batches: for training an endless sequence,
-//! balanced over the labels or not ([`Balanced`]), for evaluation each sample once.
+//! [`read_samples`] lists the samples of a dataset in either published layout; [`Loader`] makes batches: an endless sequence for
+//! training, balanced over the labels or not ([`Balanced`]), and each sample once for evaluation.
 
 mod augment;
 mod balance;

@@ -1,17 +1,17 @@
-//! Region of interest, size and scale: the part that training and evaluation share.
+//! Region of interest, size and scale: the preparation shared by training and evaluation.
 
 use ppa_core::Roi;
 
 use super::error::DataError;
 use super::raster::Raster;
 
-/// Depths are clipped here, and this depth becomes 1.
+/// Depth in mm at which depths are clipped; it becomes 1.
 pub const RANGE_MM: u16 = 1500;
 
-/// Whether a pixel of a region of interest lies in an image of `width` x `height`.
+/// Checks that at least one pixel of a region of interest is inside an image of `width` x `height`.
 ///
 /// # Errors
-/// [`DataError::RoiOutside`] if none does.
+/// [`DataError::RoiOutside`] if none is.
 pub fn check_roi(roi: &Roi, width: usize, height: usize) -> Result<(), DataError> {
     let &Roi {
         x_start,
@@ -30,15 +30,15 @@ pub fn check_roi(roi: &Roi, width: usize, height: usize) -> Result<(), DataError
     }
 }
 
-/// Side of a prepared image for a network whose input has `side` columns and rows: 1.2 times as many, rounded down.
+/// Returns the side of a prepared image for a network whose input has `side` columns and rows: 1.2 times `side`, rounded down.
 pub fn prepared_side(side: usize) -> usize {
     side * 6 / 5
 }
 
-/// The region of a depth image (mm, 0 invalid) at [`prepared_side`], still in mm; mirrored left to right if asked for.
+/// Crops a depth image (mm, 0 invalid) to the region and resizes it to [`prepared_side`], still in mm; optionally mirrors it left to right.
 ///
 /// # Errors
-/// [`DataError::RoiOutside`] if no pixel of the region lies in the image.
+/// [`DataError::RoiOutside`] if no pixel of the region is in the image.
 ///
 /// # Panics
 /// If `side` is 0.
@@ -58,17 +58,17 @@ pub fn prepare(
     Ok(region.resized(prepared_side(side), prepared_side(side)))
 }
 
-/// Depth in mm as a share of [`RANGE_MM`], in [0, 1]; invalid pixels stay 0.
+/// Converts depth in mm to a share of [`RANGE_MM`] in [0, 1]; invalid pixels stay 0.
 pub(super) fn share_of_range(prepared_mm: &Raster<u16>) -> Raster<f32> {
     prepared_mm.map(|mm| f32::from(mm.min(RANGE_MM)) / f32::from(RANGE_MM))
 }
 
-/// What the network sees of a share of the range.
+/// Converts a share of the range to a network input value.
 pub(super) fn network_value(share: f32) -> f32 {
     share - 0.5
 }
 
-/// A prepared image as the network sees it in evaluation, `side * side` values in [−0.5, 0.5].
+/// Converts a prepared image to the network's input in evaluation, `side * side` values in [−0.5, 0.5].
 pub fn evaluation_input(prepared_mm: &Raster<u16>, side: usize) -> Raster<f32> {
     share_of_range(&prepared_mm.resized(side, side)).map(network_value)
 }
@@ -102,7 +102,7 @@ mod tests {
     fn a_mirrored_image_is_prepared_as_its_mirrored_region() {
         let image = Raster::new(7, 4, (0..28).map(|i| i * i).collect()).unwrap();
         let flipped = image.mirrored();
-        // The second region is cut by the right border: its mirror image begins at the left one.
+        // The right border cuts the second region, so its mirror image begins at the left border.
         for (x_start, size, mirrored_x, cut) in [(1, 3, 3, 3), (4, 4, 0, 3)] {
             let roi = |x_start, size| Roi {
                 x_start,

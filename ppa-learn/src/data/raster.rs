@@ -11,10 +11,10 @@ pub struct Raster<T> {
 }
 
 impl<T: Copy> Raster<T> {
-    /// The image of `width * height` values.
+    /// Makes an image from `width * height` values.
     ///
     /// # Errors
-    /// [`DataError::Length`] for another number of values, or none.
+    /// [`DataError::Length`] if there are no values or their number differs.
     pub fn new(width: usize, height: usize, values: Vec<T>) -> Result<Self, DataError> {
         if values.is_empty() || width.checked_mul(height) != Some(values.len()) {
             return Err(DataError::Length {
@@ -60,7 +60,7 @@ impl<T: Copy> Raster<T> {
         &self.values[y * self.width..][..self.width]
     }
 
-    /// An image of the same size from its rows.
+    /// Makes an image of the same size row by row.
     pub(super) fn map_rows<U: Copy>(&self, mut row: impl FnMut(usize, &mut Vec<U>)) -> Raster<U> {
         let mut values = Vec::with_capacity(self.values.len());
         for y in 0..self.height {
@@ -74,13 +74,13 @@ impl<T: Copy> Raster<T> {
         }
     }
 
-    /// Every pixel changed in the same way.
+    /// Applies `change` to every pixel.
     pub fn map<U: Copy>(&self, change: impl Fn(T) -> U) -> Raster<U> {
         self.map_rows(|y, values| values.extend(self.row(y).iter().map(|&value| change(value))))
     }
 
-    /// The part of the image in columns `x..x + width` and rows `y..y + height`; what lies beyond the border is left out, as
-    /// slices of NumPy do. None when nothing is left.
+    /// Returns the part of the image in columns `x..x + width` and rows `y..y + height`, truncated at the border as with NumPy
+    /// slices. `None` if nothing is left.
     pub fn crop(&self, x: usize, y: usize, width: usize, height: usize) -> Option<Self> {
         let columns = x.min(self.width)..x.saturating_add(width).min(self.width);
         let rows = y.min(self.height)..y.saturating_add(height).min(self.height);
@@ -97,7 +97,7 @@ impl<T: Copy> Raster<T> {
         self.map_rows(|y, values| values.extend(self.row(y).iter().rev()))
     }
 
-    /// The image in another size by nearest neighbours; no depths are mixed.
+    /// Resizes the image by nearest neighbours, so that no depths are mixed.
     ///
     /// Pixel i of the result is pixel floor((i + ½) · old / new) of the image, where the scale has 16 binary places, as in
     /// OpenCV's INTER_NEAREST_EXACT.
@@ -121,11 +121,11 @@ impl<T: Copy> Raster<T> {
     }
 }
 
-/// For each of `new` places along a side its place among `old`.
+/// Returns the index among `old` pixels of a side for each of `new` pixels.
 fn nearest_sources(old: usize, new: usize) -> Vec<usize> {
     let (old, new) = (old as i64, new as i64);
     let scale = ((old << 16) + new / 2) / new;
-    // Half a scale, where an odd side takes the smaller neighbour at exact ties.
+    // Half a scale; at exact ties an odd side takes the smaller neighbour.
     let first = scale / 2 - old % 2;
     (0..new)
         .map(|i| ((scale * i + first) >> 16).clamp(0, old - 1) as usize)

@@ -2,21 +2,21 @@
 
 use super::raster::Raster;
 
-/// Binary places of a source coordinate.
+/// Number of fractional bits of a source coordinate.
 const COORDINATE_BITS: u32 = 10;
-/// Binary places of the share that a neighbour has in a pixel.
+/// Number of fractional bits of an interpolation weight.
 const SHARE_BITS: u32 = 5;
 
-/// The image turned counter-clockwise by `degrees` about its centre, bilinear, its border repeated beyond it.
+/// Rotates the image counter-clockwise by `degrees` about its centre, with bilinear interpolation and replicated borders.
 ///
-/// As OpenCV 4.8's `warpAffine`, which the published training ran on: source coordinates are sums of whole 1/1024 pixels,
-/// rounded to 1/32 of a pixel. (OpenCV 5 computes them in floating point.)
+/// The same as `warpAffine` of OpenCV 4.8, with which the published training ran: source coordinates are sums of multiples of
+/// 1/1024 pixel, rounded to 1/32 of a pixel. (OpenCV 5 computes them in floating point.)
 pub fn rotate(image: &Raster<f32>, degrees: f64) -> Raster<f32> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let (width, height) = (image.width(), image.height());
     let (cx, cy) = (width as f64 / 2.0 - 0.5, height as f64 / 2.0 - 0.5);
     let fixed = |pixels: f64| (pixels * f64::from(1 << COORDINATE_BITS)).round_ties_even() as i64;
-    // Where a pixel (x, y) comes from: the rotation by −degrees about (cx, cy).
+    // Source of pixel (x, y): its rotation by −degrees about (cx, cy).
     let along_row: Vec<[i64; 2]> = (0..width)
         .map(|x| [fixed(cos * x as f64), fixed(sin * x as f64)])
         .collect();
@@ -43,7 +43,7 @@ pub fn rotate(image: &Raster<f32>, degrees: f64) -> Raster<f32> {
     })
 }
 
-/// Whole pixels and the share of the next one, from a fixed-point coordinate.
+/// Splits a fixed-point coordinate into whole pixels and the weight of the next pixel.
 fn split(fixed: i64) -> (i64, f32) {
     let drop = COORDINATE_BITS - SHARE_BITS;
     let rounded = (fixed + (1 << (drop - 1))) >> drop;

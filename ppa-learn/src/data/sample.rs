@@ -17,11 +17,11 @@ pub struct SampleImage {
     pub path: PathBuf,
     /// The camera.
     pub camera: View,
-    /// Region around the joint.
+    /// Region of interest around the joint.
     pub roi: Roi,
-    /// Columns and rows that the camera's images have.
+    /// Columns and rows of the camera's images.
     pub size: [usize; 2],
-    /// Mirrored left to right for the network.
+    /// Whether the network sees the image mirrored left to right.
     pub mirrored: bool,
 }
 
@@ -29,7 +29,7 @@ impl SampleImage {
     /// Reads and prepares the image for a network of `side` x `side` inputs.
     ///
     /// # Errors
-    /// [`DataError`] naming the file that cannot be read, is of another size, or whose region lies outside.
+    /// [`DataError`] naming the file if it cannot be read, has another size, or its region is outside the image.
     pub fn load(&self, side: usize) -> Result<Raster<u16>, DataError> {
         let image = ppa_dataset::published::GrayImage16::read(&self.path)?;
         let found = [image.width as usize, image.height as usize];
@@ -49,36 +49,36 @@ impl SampleImage {
     }
 }
 
-/// The input of a network and the label that it should predict: an image of one camera, or of both. Of a left limb that is shown as a
-/// right one, the cameras are exchanged.
+/// Input of a network, an image of one camera or of both, and the label to predict. The cameras are exchanged for a left limb that is
+/// shown as a right one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// Path of its first image from the dataset's root.
     pub id: String,
-    /// One image, or those for the left and the right camera's input.
+    /// One image, or the images for the left and the right input.
     pub images: Vec<SampleImage>,
     /// Quality from 1 (ideal) to 3 (inadequate); NaN without a label, see [`Selection::unlabelled`](super::Selection::unlabelled).
     pub label: f64,
-    /// Standard deviation of the label over the readers, or over what was assumed.
+    /// Standard deviation of the label over the readers, or over the assumptions made.
     pub label_std: f64,
-    /// Folder of the dataset, by its canonical path. Persons of different datasets are different ones.
+    /// Canonical path of the dataset's folder. Persons of different datasets are different persons.
     pub dataset: PathBuf,
     /// N of `patient_N`, and which of the person's limbs.
     pub limb: LimbId,
     /// The camera of its first image.
     pub camera: View,
-    /// Equal for samples of one pose (of all cameras and frames) only.
+    /// Name of the pose, equal only for samples of one pose (all cameras and frames).
     pub pose: String,
     /// Number of the frame within pose and camera, from 0.
     pub frame: u32,
-    /// Medial rotation in degrees, where the dataset states it.
+    /// Medial rotation in degrees, if the dataset states it.
     pub angle_deg: Option<f64>,
-    /// Medial rotation in degrees from the pose to the best one of its limb, as the labels of the limb's samples say; where angles are
-    /// known.
+    /// Medial rotation in degrees from the pose to the best one of its limb according to the labels of the limb's samples, if the angles
+    /// are known.
     pub correction_deg: Option<f64>,
 }
 
-/// Refuses a split that has images of one person in training and in evaluation.
+/// Refuses a split with images of the same person in training and in evaluation.
 ///
 /// # Errors
 /// [`DataError::Leak`] naming the first such person.

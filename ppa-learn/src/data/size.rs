@@ -10,7 +10,7 @@ use ppa_dataset::published::ImageFileError;
 
 use super::error::DataError;
 
-/// Columns and rows of a 16-bit PNG of one channel, of which no pixel is read.
+/// Returns the columns and rows of a single-channel 16-bit PNG without reading pixels.
 pub fn size_of(path: &Path) -> Result<[usize; 2], DataError> {
     let unreadable = |source| FileError {
         action: "read",

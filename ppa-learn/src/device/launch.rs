@@ -1,4 +1,4 @@
-//! Runs of the kernels in `kernels.cu`.
+//! Launches of the kernels in `kernels.cu`.
 
 #[cfg(feature = "cuda")]
 mod cuda;
@@ -23,14 +23,14 @@ use nowhere::run as on_cpu;
 #[cfg(not(feature = "cuda"))]
 use nowhere::run as on_cuda;
 
-/// The text of the kernels.
+/// Source code of the kernels.
 #[cfg(any(feature = "cuda", test))]
 const KERNELS: &str = include_str!("kernels.cu");
 
-/// Values of a tensor: indices are of 32 bits with their sign, and may run past the end by a step before they are compared.
+/// Maximum number of values of a tensor: indices are signed 32-bit integers and may pass the end by a step before they are compared.
 const MOST_VALUES: usize = 1 << 30;
 
-/// One run of a kernel, which takes (out, inputs, threads, sizes, floats).
+/// Launch of a kernel with the parameters (out, inputs, threads, sizes, floats).
 #[derive(Debug)]
 pub struct Launch {
     kernel: &'static str,
@@ -40,13 +40,13 @@ pub struct Launch {
     out: Shape,
 }
 
-/// What a kernel is given, checked.
+/// Checked arguments of a kernel.
 #[cfg_attr(
     not(any(feature = "cuda", test)),
     expect(dead_code, reason = "what runs nowhere reads nothing")
 )]
 struct Given<'a, S> {
-    /// Where the values of each input lie.
+    /// Storage and range of the values of each input.
     inputs: Vec<(&'a S, Range<usize>)>,
     /// Threads and sizes.
     integers: Vec<i32>,
@@ -54,7 +54,7 @@ struct Given<'a, S> {
 }
 
 impl Launch {
-    /// A run of a kernel with `threads` threads and its `sizes`, in the order of its parameters; it writes a tensor of shape `out`.
+    /// Launch of a kernel with `threads` threads and its `sizes`, in the order of its parameters; it writes a tensor of shape `out`.
     pub fn new(
         kernel: &'static str,
         out: impl Into<Shape>,
@@ -70,14 +70,14 @@ impl Launch {
         }
     }
 
-    /// A run with a thread for each value that it writes.
+    /// Launch with one thread per output value.
     pub fn of_values(kernel: &'static str, out: impl Into<Shape>, sizes: &[usize]) -> Self {
         let out = out.into();
         let threads = out.elem_count();
         Self::new(kernel, out, threads, sizes)
     }
 
-    /// The same run with numbers behind its sizes.
+    /// The same launch with floats after its sizes.
     pub fn with(self, floats: &[f32]) -> Self {
         Self {
             floats: floats.to_vec(),
@@ -85,7 +85,7 @@ impl Launch {
         }
     }
 
-    /// What the kernel makes of contiguous inputs on one device, without a gradient.
+    /// Runs the kernel on contiguous inputs, all on one device, and returns its output, which has no gradient.
     pub fn run(&self, inputs: &[&Tensor]) -> Result<Tensor> {
         let device = inputs[0].device();
         if inputs
@@ -106,7 +106,7 @@ impl Launch {
         let storage = if cuda.len() == inputs.len() {
             Storage::Cuda(on_cuda(self, &self.given(&cuda)?)?)
         } else if cpu.len() == inputs.len() {
-            // Only in tests: on the CPU the network has kernels of its own.
+            // Only in tests: the network has its own kernels for the CPU.
             Storage::Cpu(on_cpu(self, &self.given(&cpu)?)?)
         } else {
             return Err(elsewhere());
@@ -120,7 +120,7 @@ impl Launch {
         ))
     }
 
-    /// What the kernel takes, if it can address all of it.
+    /// Returns the kernel's arguments, if it can address all values.
     fn given<'a, S>(&'a self, inputs: &[(&'a S, &Layout)]) -> Result<Given<'a, S>> {
         let lengths = inputs.iter().map(|(_, layout)| layout.shape().elem_count());
         let mut lengths = lengths.chain([self.out.elem_count(), self.threads]);
@@ -141,14 +141,14 @@ impl Launch {
     }
 }
 
-/// Where the values of a contiguous tensor lie in its storage.
+/// Returns the range of the values of a contiguous tensor in its storage.
 pub fn contiguous_range(layout: &Layout, op: &'static str) -> Result<Range<usize>> {
     let offsets = layout.contiguous_offsets();
     let (start, end) = offsets.ok_or_else(|| Error::RequiresContiguous { op }.bt())?;
     Ok(start..end)
 }
 
-/// The error of inputs and outputs that lie on different devices.
+/// Error for inputs and outputs on different devices.
 pub fn elsewhere() -> Error {
     Error::msg("inputs and outputs of an operation are on different devices").bt()
 }

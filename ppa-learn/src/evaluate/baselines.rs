@@ -1,4 +1,4 @@
-//! What predictions without a network achieve on the same images, and whether a network is better.
+//! Errors of predictions without a network on the same images, and whether a network is better.
 
 use std::fmt;
 
@@ -14,36 +14,36 @@ use super::verdict::{
 };
 use crate::data::{Images, Sample, evaluation_input};
 
-/// Columns and rows of the images that kernel ridge regression sees.
+/// Columns and rows of the images for kernel ridge regression.
 const SMALL_SIDE: usize = 16;
-/// Most training images of kernel ridge regression, evenly spaced among all.
+/// Maximum number of training images of kernel ridge regression, evenly spaced among all.
 const MOST_IMAGES: usize = 1000;
 
-/// What a baseline achieves, and how it compares with the network.
+/// Scores of a baseline, and its comparison with the network.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Baseline {
-    /// Which one.
+    /// Kind of baseline.
     pub kind: BaselineKind,
-    /// Of the images.
+    /// Scores over the images.
     #[serde(flatten)]
     pub scores: Scores,
-    /// Exact one-sided sign-flip test of persons' mean absolute errors: small where the network's are lower.
+    /// p-value of an exact one-sided sign-flip test of persons' mean absolute errors: small if the network's are lower.
     pub p_network_better: f64,
 }
 
-/// Baselines on a test set, beside the network's error.
+/// Baselines on a test set, next to the network's error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Baselines {
-    /// Each of them.
+    /// The baselines.
     pub baselines: Vec<Baseline>,
     /// Mean absolute error of the network.
     pub network_mae: f64,
-    /// Persons whose errors are compared.
+    /// Number of persons whose errors are compared.
     pub persons: usize,
-    /// Mean absolute error of labels that vary normally by their `std` about the true ones: no prediction can be expected to err
-    /// less. Open where all labels are given without variation.
+    /// Mean absolute error of labels that are normally distributed with their `std` about the true ones: no prediction can be expected
+    /// to have a lower one. `None` if all standard deviations are 0.
     pub label_noise_mae: Option<f64>,
-    /// Mean absolute error in degrees of corrections from the true angle to the mean best angle of the training limbs. Open where
+    /// Mean absolute error in degrees of corrections from the true angle to the mean best angle of the training limbs. `None` if
     /// either is unknown.
     pub correction_mae_deg: Option<f64>,
     /// Whether the network is better.
@@ -51,10 +51,10 @@ pub struct Baselines {
 }
 
 impl Baselines {
-    /// The baselines of training samples on the tested ones, beside the network's predictions in `rows`, one for each tested sample.
+    /// Compares baselines fitted to the training samples with the network's predictions in `rows`, one for each tested sample.
     ///
     /// # Errors
-    /// [`EvaluateError`] naming the image that cannot be used; [`DataError::Empty`](crate::data::DataError::Empty) without samples.
+    /// [`EvaluateError`] naming the image that cannot be used; [`DataError::Empty`](crate::data::DataError::Empty) if there are no samples.
     ///
     /// # Panics
     /// If there is not one row for each tested sample.
@@ -90,14 +90,14 @@ impl Baselines {
 }
 
 impl fmt::Display for Baselines {
-    /// The verdict in a sentence or two.
+    /// Writes the verdict in one or two sentences.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let compared = compared(&self.baselines);
         f.write_str(&sentence(self.network_mae, &compared, self.persons))
     }
 }
 
-/// The errors of baselines; one that is not defined is never lower than the network's.
+/// Errors of the baselines; an undefined error is NaN and never lower than the network's.
 fn compared(baselines: &[Baseline]) -> Vec<Compared> {
     let one = |baseline: &Baseline| Compared {
         kind: baseline.kind,
@@ -107,7 +107,7 @@ fn compared(baselines: &[Baseline]) -> Vec<Compared> {
     baselines.iter().map(one).collect()
 }
 
-/// What each baseline of the training samples predicts for the tested ones; the true angle only where all angles are known.
+/// Returns the predictions of each baseline for the tested samples; the baseline by angle only if all angles are known.
 ///
 /// # Errors
 /// [`EvaluateError`] naming the image that cannot be used.
@@ -126,12 +126,12 @@ pub(crate) fn baseline_predictions(
     Ok(predicted)
 }
 
-/// The best angle of a sample's limb.
+/// Returns the best angle of a sample's limb.
 fn best_angle_deg(sample: &Sample) -> Option<f64> {
     Some(sample.angle_deg? + sample.correction_deg?)
 }
 
-/// Mean distance of the tested samples' best angles from the mean of the training samples'.
+/// Returns the mean distance of the tested samples' best angles from the mean best angle of the training samples.
 fn correction_mae_deg(training: &[Sample], tested: &[Sample]) -> Option<f64> {
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let known = mean(training.iter().filter_map(best_angle_deg).collect());
@@ -144,7 +144,7 @@ fn mean_label(samples: &[Sample]) -> f64 {
     samples.iter().map(|sample| sample.label).sum::<f64>() / samples.len() as f64
 }
 
-/// Mean absolute error of each person.
+/// Returns the mean absolute error of each person.
 fn errors_of_persons(rows: &[Row], predictions: &[f64]) -> Vec<f64> {
     let persons = rows.iter().map(|row| (row.dataset, row.patient));
     let errors = rows.iter().zip(predictions);
@@ -152,7 +152,7 @@ fn errors_of_persons(rows: &[Row], predictions: &[f64]) -> Vec<f64> {
     mean_by(persons.zip(errors)).into_values().collect()
 }
 
-/// The mean label of the training samples at each tested angle; `None` unless all angles are known.
+/// Returns the mean label of the training samples at each tested angle; `None` unless all angles are known.
 fn by_angle(training: &[Sample], tested: &[Sample]) -> Option<Vec<f64>> {
     let labels: Vec<(f64, f64)> = training
         .iter()
@@ -195,7 +195,7 @@ fn kernel_ridge(training: &[Sample], tested: &[Sample]) -> Result<Vec<f64>, Eval
     Ok(tested.iter().map(|image| fit.predict(image)).collect())
 }
 
-/// The images of each sample, one after the other, as a small network would see them.
+/// Returns the concatenated images of each sample as inputs of side [`SMALL_SIDE`].
 fn small_images(samples: &[Sample]) -> Result<Vec<Vec<f32>>, EvaluateError> {
     let images = Images::new(samples.to_vec(), SMALL_SIDE, 0)?;
     let small = |sample: usize| {
@@ -207,7 +207,7 @@ fn small_images(samples: &[Sample]) -> Result<Vec<Vec<f32>>, EvaluateError> {
     (0..samples.len()).map(small).collect()
 }
 
-/// √(2/π) times the mean standard deviation, since that is the mean absolute value of a normal deviate; `None` if it is 0.
+/// Returns √(2/π) times the mean standard deviation, the mean absolute value of a normal deviate; `None` if it is 0.
 pub(crate) fn label_noise_mae(label_stds: impl ExactSizeIterator<Item = f64>) -> Option<f64> {
     let n = label_stds.len() as f64;
     let mean = label_stds.sum::<f64>() / n;

@@ -7,16 +7,16 @@ use super::row::Row;
 /// Errors of the corrections that a network predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CorrectionScores {
-    /// Images of which the correction is predicted and known.
+    /// Number of images whose correction is both predicted and known.
     pub n: usize,
     /// Mean absolute error in degrees.
     pub mae_deg: f64,
-    /// Mean error in degrees: more than 0 where predictions rotate too far medially.
+    /// Mean error in degrees: positive if predictions rotate too far medially.
     pub bias_deg: f64,
 }
 
 impl CorrectionScores {
-    /// `None` where no correction is both predicted and known.
+    /// Returns `None` if no correction is both predicted and known.
     pub(super) fn of(rows: &[Row]) -> Option<Self> {
         let error = |row: &Row| Some(row.predicted_correction_deg? - row.correction_deg?);
         let errors: Vec<f64> = rows.iter().filter_map(error).collect();

@@ -1,28 +1,28 @@
-//! Why predictions cannot be evaluated.
+//! Errors of evaluations.
 
 use ppa_dataset::FileError;
 
 use crate::data::DataError;
 
-/// Why predictions cannot be evaluated, or an evaluation cannot be written.
+/// Error in evaluating predictions or writing an evaluation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
-    /// A prediction that no metric is defined for.
+    /// A prediction for which no metric is defined.
     #[error("{image}: the prediction is {prediction}, expected a finite number")]
     NotFinite {
         /// The image.
         image: String,
-        /// What the network said.
+        /// The prediction.
         prediction: f64,
     },
     /// An image that a baseline cannot use.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// A file.
+    /// A file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A row that is no CSV.
+    /// A row cannot be written as CSV.
     #[error("rows cannot be written as CSV")]
     Csv(#[from] csv::Error),
 }

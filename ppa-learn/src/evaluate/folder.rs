@@ -1,4 +1,4 @@
-//! An evaluation as tables.
+//! Evaluations as tables in a folder.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::row::Row;
 /// Names of the files that [`write_evaluation`] writes.
 pub const EVALUATION_TABLES: [&str; 3] = ["predictions.csv", "poses.csv", "evaluation.json"];
 
-/// Writes `predictions.csv` (a row per image), `poses.csv` and `evaluation.json`.
+/// Writes `predictions.csv` (one row per image), `poses.csv` and `evaluation.json`.
 ///
 /// # Errors
 /// [`EvaluateError`] naming the file that cannot be written.
@@ -29,7 +29,7 @@ pub fn write_evaluation(
     Ok(write_whole(&all, json.as_bytes())?)
 }
 
-/// Writes rows as CSV, with a heading.
+/// Writes rows as CSV with a header.
 ///
 /// # Errors
 /// [`EvaluateError`] naming the file that cannot be written.

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Strengths of the ridge that are tried.
+/// Ridge parameters that are tried.
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
-/// The strength where all points are of one group.
+/// Ridge parameter if all points are of one group.
 const RIDGE_OF_ONE_GROUP: f64 = 1e-2;
-/// Points whose distances give the width of the kernel.
+/// Maximum number of points whose distances determine the width of the kernel.
 const WIDTH_POINTS: usize = 200;
 /// The middle of the labels, 1 to 3.
 const MIDDLE: f64 = 2.0;
@@ -20,10 +20,10 @@ pub(super) struct KernelRidge {
 }
 
 impl KernelRidge {
-    /// Fits the labels of points. The ridge is that whose mean absolute error is least when each group is predicted from the others.
+    /// Fits the labels of points with the ridge parameter whose mean absolute error is lowest when each group is predicted from the others.
     ///
     /// # Panics
-    /// If there is no point, or not one label and one group for each.
+    /// If there are no points, or not one label and one group for each.
     pub fn fit(points: Vec<Vec<f32>>, labels: &[f64], groups: &[usize]) -> Self {
         let n = points.len();
         assert!(n > 0 && labels.len() == n && groups.len() == n);
@@ -56,7 +56,7 @@ impl KernelRidge {
         }
     }
 
-    /// The label of a point.
+    /// Predicts the label of a point.
     pub fn predict(&self, point: &[f32]) -> f64 {
         let near = self.points.iter();
         let near = near.map(|other| similarity(other, point, self.width2));
@@ -68,7 +68,7 @@ impl KernelRidge {
     }
 }
 
-/// The constant stands for an offset that the ridge holds back as it does the rest.
+/// Kernel of two points. The constant 1 models an offset that is regularised like the rest.
 fn similarity(a: &[f32], b: &[f32], width2: f64) -> f64 {
     1.0 + (-squared_distance(a, b) / (2.0 * width2)).exp()
 }
@@ -80,7 +80,7 @@ fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
         .sum()
 }
 
-/// The median over pairs of different points, at most [`WIDTH_POINTS`] of them, evenly spaced; 1 where all are equal.
+/// Returns the median over pairs of different points among at most [`WIDTH_POINTS`] evenly spaced points; 1 if all are equal.
 fn median_squared_distance(points: &[Vec<f32>]) -> f64 {
     let some: Vec<&Vec<f32>> = points
         .iter()
@@ -95,7 +95,7 @@ fn median_squared_distance(points: &[Vec<f32>]) -> f64 {
     distances.get(distances.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Places of each group's points.
+/// Returns the indices of each group's points.
 fn places(groups: &[usize]) -> Vec<Vec<usize>> {
     let mut names = groups.to_vec();
     names.sort_unstable();
@@ -115,8 +115,8 @@ fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
         .inverse()
 }
 
-/// Mean absolute error of all points, each predicted without its group: the errors e of a group solve A e = w, where A is the group's part
-/// of the inverse and w that of the weights (block form of the leave-one-out formula).
+/// Returns the mean absolute error of all points, each predicted without its group: the errors e of a group solve A e = w, where A is the
+/// group's block of the inverse and w its part of the weights (block form of the leave-one-out formula).
 fn left_out_error(inverse: &DMatrix<f64>, weights: &DVector<f64>, places: &[Vec<usize>]) -> f64 {
     let error = |places: &Vec<usize>| {
         let own = inverse.select_rows(places).select_columns(places);
@@ -133,7 +133,7 @@ mod tests {
 
     use super::*;
 
-    /// Points on a curve in three dimensions with labels along it.
+    /// Points on a curve in three dimensions with labels that vary along it.
     fn curve(n: usize) -> (Vec<Vec<f32>>, Vec<f64>) {
         let at = |i: usize| i as f32 / n as f32;
         let points = (0..n).map(|i| vec![at(i), at(i).sin(), (3.0 * at(i)).cos()]);

@@ -1,6 +1,6 @@
 //! Means of values by key.
 
-/// The mean value of each key, and how many there are.
+/// Returns (key, mean value, number of values) of each key.
 pub(crate) fn means(pairs: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64, usize)> {
     let mut pairs: Vec<(f64, f64)> = pairs.collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));

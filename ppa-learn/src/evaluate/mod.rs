@@ -1,5 +1,5 @@
-//! Evaluation of predictions: metrics by image, pose and person, confusion, calibration, errors by angle, and what predictions without a
-//! network achieve.
+//! Evaluation of predictions: metrics by image, pose and person, confusion, calibration, errors by angle, and baselines without a
+//! network.
 
 mod baselines;
 mod correction;

@@ -1,4 +1,4 @@
-//! Predictions of a test set averaged over cameras and frames of each pose.
+//! Predictions of a test set averaged over the cameras and frames of each pose.
 
 use std::collections::BTreeMap;
 
@@ -8,30 +8,30 @@ use serde::Serialize;
 
 use super::row::Row;
 
-/// One pose, as `poses.csv` holds it.
+/// One pose: a row of `poses.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PoseRow {
     /// Number of the dataset, as in [`Row`].
     pub dataset: usize,
     /// N of `patient_N`.
     pub patient: u32,
-    /// Which of the person's limbs.
+    /// Side of the limb.
     pub side: Side,
-    /// The pose, unique among those of the limb.
+    /// Name of the pose, unique within the limb.
     pub pose: String,
-    /// Medial rotation in degrees, where the dataset states it.
+    /// Medial rotation in degrees, if the dataset states it.
     pub angle_deg: Option<f64>,
-    /// Images of all cameras and frames.
+    /// Number of images of all cameras and frames.
     pub images: usize,
     /// Mean label of the images.
     pub label: f64,
     /// Mean prediction of the images.
     pub prediction: f64,
-    /// How far frames of the pose differ: see [`frame_spread`].
+    /// Spread of the predictions of the pose's frames: see [`frame_spread`].
     pub frame_spread: Option<f64>,
 }
 
-/// The poses of some predictions, in order of dataset, person, side and name.
+/// Averages predictions by pose, in the order of dataset, person, side and name.
 pub fn poses(rows: &[Row]) -> Vec<PoseRow> {
     let mut poses: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
     for row in rows {
@@ -57,8 +57,8 @@ pub fn poses(rows: &[Row]) -> Vec<PoseRow> {
     poses.into_iter().map(of_pose).collect()
 }
 
-/// Standard deviation of the predictions of one pose by one camera about their mean, pooled over poses and cameras: the root
-/// of all squared deviations divided by the sum of all n - 1. None without two frames of one pose and camera.
+/// Returns the standard deviation of the predictions of one pose by one camera, pooled over poses and cameras: the root of
+/// the sum of all squared deviations divided by the sum of all n - 1. `None` if no pose has two frames of one camera.
 pub fn frame_spread<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<f64> {
     let mut frames: BTreeMap<_, Vec<f64>> = BTreeMap::new();
     for row in rows {
@@ -74,7 +74,8 @@ pub fn frame_spread<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<f64> 
     (degrees > 0).then(|| (squares / degrees as f64).sqrt())
 }
 
-/// One good (label 1) and two bad poses (label 3) of a limb, from (label, prediction) of all its poses; none for a limb with other poses.
+/// Returns the one good (label 1) and two bad poses (label 3) of a limb, from (label, prediction) of all its poses; `None` for a limb with
+/// other poses.
 pub(crate) fn triple(poses: &[(f64, f64)]) -> Option<PoseTriple> {
     let of = |label: f64| {
         let poses = poses.iter().filter(move |pose| pose.0 == label);
@@ -89,7 +90,7 @@ pub(crate) fn triple(poses: &[(f64, f64)]) -> Option<PoseTriple> {
     }
 }
 
-/// The triples of all limbs, as in the paper's clinical dataset; none if a limb has other poses.
+/// Returns the triples of all limbs, as in the paper's clinical dataset; `None` if a limb has other poses.
 pub fn triples(poses: &[PoseRow]) -> Option<Vec<PoseTriple>> {
     let mut limbs: BTreeMap<_, Vec<(f64, f64)>> = BTreeMap::new();
     for pose in poses {

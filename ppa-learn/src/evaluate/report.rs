@@ -1,4 +1,4 @@
-//! Everything that is reported about the predictions for a test set.
+//! Report on the predictions for a test set.
 
 use std::collections::BTreeMap;
 
@@ -13,40 +13,40 @@ use super::poses::{PoseRow, frame_spread, poses, triples};
 use super::row::Row;
 use super::scores::Scores;
 
-/// Predictions this close together are one point of the calibration by prediction.
+/// Bin width of the calibration by prediction.
 const BIN: f64 = 0.25;
 
 /// Metrics of a test set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// Set where the predictions of the images hardly differ: all metrics are then those of a constant.
+    /// Set if the predictions of the images hardly differ: all metrics are then those of a constant.
     pub constant_prediction: Option<ConstantPrediction>,
-    /// Every image by itself.
+    /// Scores over single images.
     pub images: Scores,
-    /// Predictions averaged over cameras and frames of a pose.
+    /// Scores over poses, whose predictions are averaged over cameras and frames.
     pub poses: Scores,
-    /// How far the predictions of a pose's frames differ: see [`frame_spread`].
+    /// Spread of the predictions of a pose's frames: see [`frame_spread`].
     pub frame_spread: Option<f64>,
-    /// Pose Delta; open unless every limb has one pose of label 1 and two of label 3.
+    /// Pose Delta; `None` unless every limb has one pose of label 1 and two of label 3.
     pub pose_delta: Option<f64>,
-    /// Pose Margin Accuracy; open where Pose Delta is.
+    /// Pose Margin Accuracy; `None` if Pose Delta is.
     pub pose_margin_accuracy: Option<f64>,
-    /// The poses of each person.
+    /// Scores over the poses of each person.
     pub persons: Vec<PersonScores>,
-    /// Numbers of images by class of the label (row) and of the prediction (column): 1, 2 or 3, the nearest; halves go up.
+    /// Numbers of images by class of the label (row) and of the prediction (column): the nearest of 1, 2 and 3; halves are rounded up.
     pub confusion: [[usize; 3]; 3],
-    /// The same by half steps: 1, 1.5, 2, 2.5 or 3.
+    /// The same in half steps: 1, 1.5, 2, 2.5 or 3.
     pub confusion_half_steps: [[usize; 5]; 5],
     /// (label, mean prediction, images) of each label that occurs.
     pub calibration: Vec<(f64, f64, usize)>,
-    /// (mean label, mean prediction, images) of the images whose predictions lie within one quarter: 1 to 1.25, 1.25 to 1.5, ….
+    /// (mean label, mean prediction, images) of the images whose predictions are in one quarter: 1 to 1.25, 1.25 to 1.5, ….
     pub calibration_by_prediction: Vec<(f64, f64, usize)>,
     /// (degrees, mean absolute error, images) of each angle that the dataset states.
     pub error_by_angle: Vec<(f64, f64, usize)>,
     /// Errors of corrections, if the network predicts them and they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<CorrectionScores>,
-    /// What predictions without a network achieve, if it was computed.
+    /// Baselines without a network, if they were computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baselines: Option<Baselines>,
 }
@@ -58,13 +58,13 @@ pub struct PersonScores {
     pub dataset: usize,
     /// N of `patient_N`.
     pub patient: u32,
-    /// Of the poses.
+    /// Scores over the poses.
     #[serde(flatten)]
     pub scores: Scores,
 }
 
 impl Evaluation {
-    /// The metrics of some predictions, without baselines.
+    /// Computes the metrics of predictions, without baselines.
     ///
     /// # Errors
     /// [`EvaluateError::NotFinite`] naming the first image whose prediction is not finite.
@@ -116,7 +116,7 @@ impl Evaluation {
     }
 }
 
-/// Numbers of pairs of label (row) and prediction (column) by N classes from 1 to 3.
+/// Counts pairs of label (row) and prediction (column) in N classes from 1 to 3.
 fn confusion<const N: usize>(pairs: &[(f64, f64)]) -> [[usize; N]; N] {
     let last = (N - 1) as f64;
     let class = |quality: f64| {
@@ -131,7 +131,7 @@ fn confusion<const N: usize>(pairs: &[(f64, f64)]) -> [[usize; N]; N] {
     table
 }
 
-/// Mean label, mean prediction and number of the pairs of each bin of predictions.
+/// Returns mean label, mean prediction and number of pairs for each bin of predictions.
 fn by_prediction(pairs: &[(f64, f64)]) -> Vec<(f64, f64, usize)> {
     let bin = |pair: &(f64, f64)| (pair.1 / BIN).floor();
     let labels = means(pairs.iter().map(|pair| (bin(pair), pair.0)));
@@ -175,7 +175,7 @@ mod tests {
         let evaluation = Evaluation::of(&rows).unwrap();
         assert_eq!(evaluation.images.n, 4);
         assert_eq!(evaluation.images.mae, Some((0.0 + 1.0 + 0.5 + 1.0) / 4.0));
-        // Pose a of person 1 is 1.5 on average; pose a of person 2 is another one.
+        // The mean of pose a of person 1 is 1.5; pose a of person 2 is a different pose.
         assert_eq!(evaluation.poses.n, 3);
         assert_eq!(evaluation.poses.mae, Some((0.5 + 0.5 + 1.0) / 3.0));
         assert_eq!(evaluation.poses.sensitivity, Some(0.5));

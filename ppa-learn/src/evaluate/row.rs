@@ -1,4 +1,4 @@
-//! One prediction, as `predictions.csv` holds it.
+//! Rows of `predictions.csv`.
 
 use ppa_dataset::layout::{Side, View};
 use serde::{Deserialize, Serialize};
@@ -6,39 +6,39 @@ use serde::{Deserialize, Serialize};
 use crate::PosePrediction;
 use crate::data::Sample;
 
-/// A prediction and its label. The columns are those that `ppa metrics` and the experiments read, and more.
+/// A prediction and its label. The columns include those that `ppa metrics` and the experiments read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Path of the image from the dataset's root.
     pub id: String,
-    /// Number of its dataset in the order in which datasets appear, from 1: patients of different ones are different persons.
+    /// Number of the dataset in order of appearance, from 1: patients of different datasets are different persons.
     pub dataset: usize,
     /// The camera.
     pub camera: View,
     /// N of `patient_N`.
     pub patient: u32,
-    /// Which of the person's limbs.
+    /// Side of the limb.
     pub side: Side,
-    /// The pose, unique among those of the limb.
+    /// Name of the pose, unique within the limb.
     pub pose: String,
     /// Number of the frame within pose and camera, from 0.
     pub frame: u32,
-    /// Medial rotation in degrees, where the dataset states it.
+    /// Medial rotation in degrees, if the dataset states it.
     pub angle_deg: Option<f64>,
-    /// Quality from 1 to 3.
+    /// Label: quality from 1 to 3.
     pub label: f64,
-    /// What the network says.
+    /// The network's prediction.
     pub prediction: f64,
-    /// Medial rotation in degrees to the best pose of the limb, where angles are known.
+    /// Medial rotation in degrees to the best pose of the limb, if angles are known.
     #[serde(default)]
     pub correction_deg: Option<f64>,
-    /// What the network says of it, if it predicts corrections.
+    /// The network's prediction of the correction, if it makes one.
     #[serde(default)]
     pub predicted_correction_deg: Option<f64>,
 }
 
 impl Row {
-    /// The rows of some samples and what a network said of each.
+    /// Makes rows from samples and the network's predictions.
     ///
     /// # Panics
     /// If there is not one prediction for each sample.

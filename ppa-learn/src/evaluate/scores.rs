@@ -1,8 +1,8 @@
-//! The metrics of some labels and predictions.
+//! Metrics of labels and predictions.
 
 use serde::Serialize;
 
-/// The metrics of `ppa-metrics`; those that are not defined for these labels are left open.
+/// The metrics of `ppa-metrics`; `None` for those that are not defined for these labels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scores {
     /// Number of predictions.
@@ -11,20 +11,20 @@ pub struct Scores {
     pub mse: Option<f64>,
     /// Mean absolute error.
     pub mae: Option<f64>,
-    /// Spearman's rank correlation; open where labels or predictions are all equal.
+    /// Spearman's rank correlation; `None` if all labels or all predictions are equal.
     pub spearman: Option<f64>,
     /// Share with |error| < 0.5.
     pub accuracy: Option<f64>,
-    /// Share on the label's side of 2.5.
+    /// Share of predictions on the same side of 2.5 as the label.
     pub diagnostic_accuracy: Option<f64>,
-    /// Share of the non-diagnostic labels that are found; open where there is none.
+    /// Share of the non-diagnostic labels that are predicted as such; `None` if there are none.
     pub sensitivity: Option<f64>,
-    /// Share of the diagnostic labels that are found; open where there is none.
+    /// Share of the diagnostic labels that are predicted as such; `None` if there are none.
     pub specificity: Option<f64>,
 }
 
 impl Scores {
-    /// The metrics of pairs of label and prediction.
+    /// Computes the metrics of pairs of label and prediction.
     pub fn of(pairs: &[(f64, f64)]) -> Self {
         let (labels, predictions): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
         let [x, y] = [&labels[..], &predictions[..]];

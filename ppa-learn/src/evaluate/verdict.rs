@@ -1,4 +1,4 @@
-//! Whether a network is better than predictions without one, and how to say so.
+//! Verdict on whether a network is better than the baselines, and its wording.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -6,7 +6,7 @@ use std::fmt;
 use ppa_metrics::{MAX_PAIRS, PermutationTest, sign_flip_permutation};
 use serde::{Deserialize, Serialize};
 
-/// Below this, a difference between persons' errors is not put down to chance.
+/// Significance level of differences between persons' errors.
 const SIGNIFICANT: f64 = 0.05;
 
 /// A prediction without a network.
@@ -15,7 +15,7 @@ const SIGNIFICANT: f64 = 0.05;
 pub enum BaselineKind {
     /// The mean label of the training images.
     Constant,
-    /// The mean label of the training images at the pose's true angle, linear between angles; where all angles are known.
+    /// The mean label of the training images at the pose's true angle, interpolated linearly between angles; only if all angles are known.
     Angle,
     /// Kernel ridge regression on images of 16 x 16 pixels.
     KernelRidge,
@@ -37,31 +37,31 @@ impl fmt::Display for BaselineKind {
 pub enum Verdict {
     /// Its mean absolute error is lower than that of every baseline, each with p < 0.05.
     Better,
-    /// It is lower, but could be so by chance.
+    /// It is lower, but not significantly.
     NotShown,
     /// It is not lower than that of every baseline.
     NotBetter,
 }
 
-/// A baseline's error, and how surely the network's is lower.
+/// A baseline's error, and the significance of the network's lower one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Compared {
-    /// Which baseline.
+    /// Kind of baseline.
     pub kind: BaselineKind,
     /// Its mean absolute error; NaN if it is not defined.
     pub mae: f64,
-    /// Exact one-sided sign-flip test of persons' mean absolute errors: small where the network's are lower.
+    /// p-value of an exact one-sided sign-flip test of persons' mean absolute errors: small if the network's are lower.
     pub p_network_better: f64,
 }
 
-/// Exact one-sided sign-flip test of persons' mean absolute errors, small where the network's are lower; 1 if there is no pair.
+/// Returns the p-value of [`Compared::p_network_better`]; 1 if there is no pair.
 pub(crate) fn p_network_better(baseline: &[f64], network: &[f64]) -> f64 {
     test_of_persons(baseline, network).map_or(1.0, |test| test.p_one_sided)
 }
 
-/// Exact sign-flip test of persons' mean absolute errors, paired; `None` if there is no pair.
+/// Runs the exact paired sign-flip test of persons' mean absolute errors; `None` if there is no pair.
 ///
-/// More than [`MAX_PAIRS`] persons are averaged in groups of equal size but the last.
+/// More than [`MAX_PAIRS`] persons are averaged in groups of equal size, except the last.
 pub(crate) fn test_of_persons(first: &[f64], second: &[f64]) -> Option<PermutationTest> {
     let groups = |errors: &[f64]| -> Vec<f64> {
         let size = errors.len().div_ceil(MAX_PAIRS).max(1);
@@ -71,7 +71,7 @@ pub(crate) fn test_of_persons(first: &[f64], second: &[f64]) -> Option<Permutati
     sign_flip_permutation(&groups(first), &groups(second)).ok()
 }
 
-/// The mean of each key's values.
+/// Returns the mean of each key's values.
 pub(crate) fn mean_by<K: Ord>(pairs: impl Iterator<Item = (K, f64)>) -> BTreeMap<K, f64> {
     let mut sums: BTreeMap<K, (f64, f64)> = BTreeMap::new();
     for (key, value) in pairs {
@@ -83,7 +83,7 @@ pub(crate) fn mean_by<K: Ord>(pairs: impl Iterator<Item = (K, f64)>) -> BTreeMap
     sums.into_iter().map(mean).collect()
 }
 
-/// The verdict on a network with this mean absolute error.
+/// Returns the verdict on a network with this mean absolute error.
 pub(crate) fn verdict(network_mae: f64, baselines: &[Compared]) -> Verdict {
     if !baselines.iter().all(|b| network_mae < b.mae) {
         Verdict::NotBetter
@@ -94,7 +94,7 @@ pub(crate) fn verdict(network_mae: f64, baselines: &[Compared]) -> Verdict {
     }
 }
 
-/// The verdict in a sentence or two.
+/// Returns the verdict in one or two sentences.
 pub(crate) fn sentence(network_mae: f64, baselines: &[Compared], persons: usize) -> String {
     let named = |of: &dyn Fn(&Compared) -> Option<f64>| {
         let named = baselines.iter().filter_map(|b| Some((b.kind, of(b)?)));

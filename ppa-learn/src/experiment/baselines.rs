@@ -1,4 +1,4 @@
-//! Predictions without a network on the test sets of an experiment.
+//! Baselines without a network on the test sets of an experiment.
 
 use std::fs::create_dir_all;
 
@@ -17,10 +17,10 @@ use crate::PosePrediction;
 use crate::evaluate::{BaselineKind, Row, baseline_predictions};
 use crate::train::{TrainError, samples};
 
-/// Baselines of one view's images of a fold, as a file holds them.
+/// Content of the file with the baselines of one fold and view.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct OfView {
-    /// What they were computed from.
+    /// Record of the settings and data used.
     record: Record,
     /// Standard deviation of each tested image's label.
     label_std: Vec<f64>,
@@ -28,8 +28,8 @@ struct OfView {
 }
 
 impl Runner<'_> {
-    /// Adds to results what the baselines achieve on each fold: computed from all its training images without variants of the skin,
-    /// kept in a file of each fold and view.
+    /// Adds to the results the baselines of each fold, computed from all its training images without variants of the skin and cached in
+    /// a file for each fold and view.
     ///
     /// # Errors
     /// [`ExperimentError`] naming the fold, or the file.
@@ -60,7 +60,7 @@ impl Runner<'_> {
         fold: usize,
         view: View,
     ) -> Result<OfView, ExperimentError> {
-        // Tested images are the same for all columns and seeds. A learning curve's columns are compared with baselines of all data.
+        // Tested images are the same for all columns and seeds. The columns of a learning curve are compared with baselines of all data.
         let configuration = Configuration {
             variation: Variation::None,
             ..results.columns()[0]

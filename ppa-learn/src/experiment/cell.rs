@@ -3,15 +3,15 @@
 use super::metric::Metric;
 use super::results::{Results, Summary};
 
-/// A number of a table as it is printed.
+/// Cell of a table as it is printed.
 #[derive(Debug, Clone)]
 pub struct Cell {
-    /// What is printed; none if there is nothing yet.
+    /// The value; `None` if there is no result yet.
     pub summary: Option<Summary>,
     mean: String,
     std: Option<String>,
     best: bool,
-    /// Seeds that count, where they are fewer than planned.
+    /// Number of seeds included, if fewer than planned.
     of_seeds: Option<usize>,
 }
 
@@ -60,7 +60,7 @@ impl Cell {
         })
     }
 
-    /// The mean as it is given, and what stands after it.
+    /// Returns the given mean and the text that follows it.
     fn with_mean(&self, mean: String) -> String {
         let std = self
             .std
@@ -85,7 +85,7 @@ impl Cell {
     }
 }
 
-/// Marks the best cells. Those that print the same number are equally good; where all print the same, none is the best.
+/// Marks the best cells. Cells that print the same number are equally good; if all print the same, none is marked.
 pub fn with_best(mut cells: Vec<Cell>, metric: Metric) -> Vec<Cell> {
     let means = cells.iter().filter_map(|cell| Some(cell.summary?.mean));
     let best = match metric.lower_is_better() {

@@ -1,4 +1,4 @@
-//! Checks of the data of all trainings before the first one begins.
+//! Checks of the data of all training runs before the first one starts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -11,20 +11,20 @@ use super::training::Training;
 use crate::data::{Balanced, DataError};
 use crate::train::{Source, TrainConfig, TrainError, samples};
 
-/// Persons of some images: dataset and number.
+/// Persons, by dataset and number.
 type Persons = BTreeSet<(PathBuf, u32)>;
 
-/// What was found of the images of some sources, by how the sources are written.
+/// Persons or problems found in the images of sources, by the text of the sources.
 type Seen = BTreeMap<String, Result<Persons, BTreeSet<String>>>;
 
 impl Runner<'_> {
-    /// Looks at images, labels, regions, body shapes and persons of the trainings and tests that `mine` picks by the number of their run
-    /// from 0, as the trainings will, and at the weights that some begin with.
+    /// Checks the images, labels, regions, body shapes, persons and initial weights of the training runs and tests that `mine` selects by
+    /// the number of their run, from 0.
     ///
     /// # Errors
-    /// [`ExperimentError::Unusable`] with every reason why a training could not run.
+    /// [`ExperimentError::Unusable`] with every reason why a training run could not start.
     pub fn check_data(&self, mine: impl Fn(usize) -> bool) -> Result<(), ExperimentError> {
-        // Seeds draw from the same images: one of them stands for all.
+        // All seeds use the same images, so one of them is enough.
         let picked = self.runs().into_iter().enumerate();
         let picked = picked
             .filter(|&(n, _)| mine(n))
@@ -52,7 +52,7 @@ impl Runner<'_> {
         }
     }
 
-    /// What stands against a run and the pretraining it needs.
+    /// Returns the problems of a run and of the pretraining that it needs.
     fn problems(
         &self,
         run: Training,
@@ -88,7 +88,7 @@ fn seed(training: Training) -> u64 {
     }
 }
 
-/// Persons of the images of some sources; adds what is wrong with them.
+/// Returns the persons in the images of sources, and adds the problems found.
 fn persons(
     config: &TrainConfig,
     sources: &[Source],
@@ -114,7 +114,7 @@ fn look(config: &TrainConfig, sources: &[Source]) -> Result<Persons, BTreeSet<St
         Ok(persons) => return Ok(persons),
         Err(error) => error,
     };
-    // The error names the first body shape that is missing; each by itself names all of them.
+    // The error names only the first missing body shape; checking each shape separately names all of them.
     let one_shape = |source: &Source| -> Vec<Source> {
         let shapes = source.shapes.iter().flatten();
         let only = |&shape| Source {

@@ -1,4 +1,4 @@
-//! Configurations that the paper compares: the columns of its tables 1 to 4.
+//! Configurations compared in the paper: the columns of its tables 1 to 4.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -54,7 +54,7 @@ pub enum Variation {
     Unmirrored,
 }
 
-/// Body shapes of the synthetic dataset that a network is trained with.
+/// Body shapes of the synthetic dataset that are used for training.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Shapes {
@@ -68,29 +68,29 @@ pub enum Shapes {
     All,
 }
 
-/// Camera views whose synthetic images a pair of networks is pretrained with.
+/// Camera views whose synthetic images are used to pretrain a pair of networks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ViewChoice {
-    /// Both networks begin with the same weights, pretrained with the images of both views.
+    /// Both networks start from the same weights, pretrained with the images of both views.
     Unified,
-    /// Each network begins with weights that are pretrained with the images of its own view.
+    /// Each network starts from weights pretrained with the images of its own view.
     Specific,
 }
 
-/// Weights that a network begins with.
+/// Initial weights of a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// Random ones.
+    /// Random weights.
     Scratch,
-    /// Those of a file, trained on ImageNet.
+    /// Weights trained on ImageNet, from a file.
     ImageNet,
-    /// Pretrained on all of the synthetic dataset.
+    /// Weights pretrained on all of the synthetic dataset.
     Synthetic {
-        /// Views that the weights are pretrained with.
+        /// Views used for pretraining.
         views: ViewChoice,
-        /// Shapes that the weights are pretrained with.
+        /// Shapes used for pretraining.
         shapes: Shapes,
     },
 }
@@ -100,15 +100,15 @@ pub enum Start {
 pub struct Configuration {
     /// The table.
     pub experiment: Experiment,
-    /// Weights to begin with.
+    /// Initial weights.
     pub start: Start,
-    /// Shapes that are trained with after that: [`Shapes::Original`] where the images are not synthetic.
+    /// Shapes used for the training after that: [`Shapes::Original`] if the images are not synthetic.
     pub shapes: Shapes,
     /// How the networks differ from those of experiment 1.
     pub variation: Variation,
 }
 
-/// A name that no experiment has.
+/// Error for an unknown name of an experiment.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown experiment {0:?}; expected 1, 2a, 2b, 2c, persons, poses, shapes or ablations")]
 pub struct UnknownExperiment(String);
@@ -124,13 +124,13 @@ impl FromStr for Experiment {
 }
 
 impl Experiment {
-    /// Those of the paper, in its order.
+    /// The experiments of the paper, in its order.
     pub const OF_PAPER: [Self; 4] = [Self::One, Self::TwoA, Self::TwoB, Self::TwoC];
 
-    /// Those that are not in the paper.
+    /// The experiments that are not in the paper.
     pub const OTHERS: [Self; 4] = [Self::Persons, Self::Poses, Self::Shapes, Self::Ablations];
 
-    /// The name on the command line and in files.
+    /// Returns the name used on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::One => "1",
@@ -144,9 +144,9 @@ impl Experiment {
         }
     }
 
-    /// The columns of its table, in the paper's order.
+    /// Returns the columns of the experiment's table, in the paper's order.
     ///
-    /// The four tables have 22 columns. The paper's text counts 21 configurations and 980 runs, which is what these are
+    /// The four tables have 22 columns. The paper's text counts 21 configurations and 980 runs, which are the numbers
     /// without ImageNet in experiment 2b: (4 x 3 + 10 x 2 + 3 x 3 + 4 x 2) folds x 2 views x 10 seeds.
     pub fn configurations(self) -> Vec<Configuration> {
         use Shapes::{All, Bumps, Original, Size};
@@ -203,7 +203,7 @@ impl Experiment {
         starts.into_iter().map(column).collect()
     }
 
-    /// The two columns whose MAE the paper compares by a permutation test: from scratch and pretrained.
+    /// Returns the two columns whose MAE the paper compares by a permutation test: from scratch and pretrained.
     pub fn tested_pair(self) -> Option<[Configuration; 2]> {
         let shapes = match self {
             Self::TwoA => Shapes::Size,
@@ -222,7 +222,7 @@ impl Experiment {
         }))
     }
 
-    /// The column of a variation of experiment 1, trained from scratch without variants of the skin.
+    /// Returns the column of a variation of experiment 1, trained from scratch without variants of the skin.
     pub fn with_variation(self, variation: Variation) -> Configuration {
         Configuration {
             experiment: self,
@@ -248,7 +248,7 @@ impl fmt::Display for Variation {
 }
 
 impl Shapes {
-    /// The variants of the skin that these are.
+    /// Returns the body shapes included.
     pub fn variants(self) -> &'static [BodyShape] {
         use BodyShape::{Big, BumpsA, BumpsB, Orig, Small};
         match self {
@@ -295,7 +295,7 @@ impl ViewChoice {
 }
 
 impl Configuration {
-    /// Headings of the column as the paper prints them, the most general first.
+    /// Returns the headings of the column as printed in the paper, the most general first.
     pub fn headings(self) -> Vec<String> {
         if self.is_named_by_variation() {
             return vec![self.variation.to_string()];
@@ -308,7 +308,7 @@ impl Configuration {
         self.variation != Variation::None || self.experiment == Experiment::Ablations
     }
 
-    /// The cameras whose networks' predictions are averaged.
+    /// Returns the cameras whose networks' predictions are averaged.
     pub fn views(self) -> &'static [View] {
         match self.variation {
             Variation::OneCamera(View::Left) => &[View::Left],
@@ -339,7 +339,7 @@ impl Configuration {
         [vec!["pretrained on synthetic dataset"], below].concat()
     }
 
-    /// A name for folders and rows: unique within its experiment, of lower-case letters and `-`.
+    /// Returns the name for folders and rows, unique within the experiment, of lower-case letters and `-`.
     pub fn name(self) -> String {
         match self.start {
             _ if self.is_named_by_variation() => self.variation.to_string().replace(' ', "-"),

@@ -1,4 +1,4 @@
-//! Why an experiment cannot be run or judged.
+//! Errors of experiments.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use super::table::Incomplete;
 use crate::evaluate::EvaluateError;
 use crate::train::{ConfigError, TrainError};
 
-/// Why an experiment cannot be run or judged.
+/// Error in running or evaluating an experiment.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
@@ -21,10 +21,10 @@ pub enum ExperimentError {
     Plan {
         /// The file.
         path: PathBuf,
-        /// What and where.
+        /// The error and its position.
         message: String,
     },
-    /// What the plan says of the training.
+    /// An error in the plan's training configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// The plan names no dataset for an experiment.
@@ -32,34 +32,34 @@ pub enum ExperimentError {
     NoTarget {
         /// The experiment.
         experiment: Experiment,
-        /// The key.
+        /// The missing key.
         key: &'static str,
     },
-    /// The dataset.
+    /// An error in the dataset.
     #[error(transparent)]
     Dataset(#[from] PublishedError),
-    /// The folds.
+    /// An error in the folds.
     #[error(transparent)]
     Folds(#[from] FoldError),
-    /// A training.
+    /// An error in a training run.
     #[error("{training}")]
     Training {
-        /// Which one.
+        /// The training run.
         training: String,
-        /// What was wrong.
+        /// The cause.
         source: Box<TrainError>,
     },
-    /// Data that trainings need and that cannot be used.
+    /// Unusable data of training runs.
     #[error("{unusable} of {trainings} training runs of each seed cannot start: {problems}")]
     Unusable {
-        /// Trainings of one seed that cannot begin.
+        /// Number of training runs of one seed that cannot start.
         unusable: usize,
-        /// Trainings of one seed.
+        /// Number of training runs of one seed.
         trainings: usize,
-        /// What is wrong with their data.
+        /// Problems with their data.
         problems: String,
     },
-    /// Results of other settings or data where those of a training should go.
+    /// The folder of a training run holds results of other settings or data.
     #[error("{} was made with other settings or data; choose another folder", .0.display())]
     OtherSettings(PathBuf),
     /// Predictions that cannot be read.
@@ -67,15 +67,15 @@ pub enum ExperimentError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The cause.
         message: String,
     },
-    /// Predictions that cannot be judged.
+    /// Predictions that cannot be evaluated.
     #[error("{place}")]
     Predictions {
         /// Column, seed and fold.
         place: String,
-        /// What is wrong.
+        /// The cause.
         source: PredictionError,
     },
     /// Results are missing.
@@ -84,7 +84,7 @@ pub enum ExperimentError {
     /// Predictions that cannot be written.
     #[error(transparent)]
     Write(#[from] EvaluateError),
-    /// A file.
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
 }

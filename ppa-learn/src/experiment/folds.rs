@@ -6,39 +6,39 @@ use rand::seq::SliceRandom;
 
 use crate::random::{Purpose, stream};
 
-/// Why persons could not be divided into folds.
+/// Error in dividing persons into folds.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FoldError {
-    /// Not one person for each fold, or nobody left to train with.
+    /// Fewer persons than folds, or no person left for training.
     #[error(
         "{persons} persons cannot be tested in {folds} folds: each fold needs at least one person to test and one to train with"
     )]
     TooFewPersons {
-        /// Persons there are.
+        /// Number of persons.
         persons: usize,
-        /// Folds asked for.
+        /// Number of folds requested.
         folds: usize,
     },
-    /// No choice of persons gives every fold the limbs asked for.
+    /// No choice of persons gives every fold the requested number of limbs.
     #[error(
         "no choice of {folds} sets of persons gives each set {limbs} limbs and leaves a person to train with; limbs per person: {}",
         ppa_core::text::numbers(counts.iter().map(|&n| n as f64))
     )]
     NoSuchLimbs {
-        /// Folds asked for.
+        /// Number of folds requested.
         folds: usize,
-        /// Limbs that each test set should have.
+        /// Number of limbs requested for each test set.
         limbs: usize,
-        /// Limbs of each person.
+        /// Number of limbs of each person.
         counts: Vec<usize>,
     },
 }
 
-/// Persons of each fold's test set, so that each person is tested once and the sets differ by at most one person.
+/// Returns the persons of each fold's test set, such that each person is tested once and the sizes of the sets differ by at most one.
 ///
-/// With as many folds as persons, each fold tests one of them: the paper's preparations, where one is trained with and
-/// the other tested.
+/// With as many folds as persons, each fold tests one person, as for the paper's preparations, where one is used for
+/// training and the other for testing.
 ///
 /// # Errors
 /// [`FoldError::TooFewPersons`].
@@ -59,13 +59,13 @@ pub fn cross_validation(
     Ok(sets)
 }
 
-/// Persons of each fold's test set, so that each set has `limbs` limbs and nobody is tested twice: the paper's folds of
-/// the synthetic dataset, where three random ankles are tested.
+/// Returns the persons of each fold's test set, such that each set has `limbs` limbs and nobody is tested twice: the paper's
+/// folds of the synthetic dataset, where three random ankles are tested.
 ///
 /// `limbs_of` counts the limbs of each person.
 ///
 /// # Errors
-/// [`FoldError`] if there are too few persons, or if no choice of them makes up the number in every fold.
+/// [`FoldError`] if there are too few persons, or if no choice of them gives the number of limbs in every fold.
 pub fn folds_of_limbs(
     limbs_of: &BTreeMap<u32, usize>,
     limbs: usize,
@@ -95,21 +95,21 @@ pub fn folds_of_limbs(
     Ok(sets)
 }
 
-/// Search for test sets, the first persons of the random order first.
+/// Search for test sets, trying persons in their random order.
 struct Search {
     limbs: usize,
     counts: Vec<usize>,
     fold_of: Vec<Option<usize>>,
-    /// Numbers of folds to fill and limbs of the persons left, in order, from which nothing was found.
+    /// States without a solution: number of folds to fill, and sorted limb counts of the remaining persons.
     hopeless: BTreeSet<(usize, Vec<usize>)>,
 }
 
 impl Search {
-    /// Fills fold number `fold`, which still needs `open` limbs from persons at or after `from`, and those below it.
+    /// Fills fold number `fold`, which still needs `open` limbs from persons at or after `from`, and then the folds below it.
     fn fill(&mut self, fold: usize, from: usize, open: usize) -> bool {
         if open == 0 {
             if fold == 1 {
-                // Somebody other than those tested in this fold is there to train with.
+                // At least one person outside this fold is left for training.
                 return self.fold_of.iter().any(|&of| of != Some(fold));
             }
             let state = (fold - 1, self.left());
@@ -122,7 +122,7 @@ impl Search {
             }
             return found;
         }
-        // Where a person did not help, no later one with as many limbs does.
+        // If a person did not lead to a solution, no later one with the same number of limbs does.
         let mut tried = BTreeSet::new();
         for n in from..self.counts.len() {
             let count = self.counts[n];
@@ -200,7 +200,7 @@ mod tests {
             }
         }
         assert!(folds_of_limbs(&limbs, 3, 0, 1).is_err());
-        // An odd number of limbs of persons with two: said at once, however many persons there are.
+        // An odd number of limbs from persons with two each: must fail quickly for any number of persons.
         let pairs: BTreeMap<_, _> = persons(200).into_iter().map(|p| (p, 2)).collect();
         assert!(folds_of_limbs(&pairs, 21, 3, 1).is_err());
         assert_eq!(

@@ -18,16 +18,16 @@ pub enum Metric {
     PoseMargin,
     /// Share with an error below 0.5.
     Accuracy,
-    /// Share on the label's side of 2.5.
+    /// Share of predictions on the same side of 2.5 as the label.
     DiagnosticAccuracy,
-    /// Share of the non-diagnostic poses that are found.
+    /// Share of the non-diagnostic poses that are predicted as such.
     Sensitivity,
-    /// Share of the diagnostic poses that are found.
+    /// Share of the diagnostic poses that are predicted as such.
     Specificity,
 }
 
 impl Metric {
-    /// Rows of an experiment's table, in the paper's order.
+    /// Returns the rows of an experiment's table, in the paper's order.
     pub fn of(experiment: Experiment) -> Vec<Self> {
         let ranking =
             (experiment == Experiment::TwoB).then_some([Self::PoseDelta, Self::PoseMargin]);
@@ -43,7 +43,7 @@ impl Metric {
             .collect()
     }
 
-    /// The row's name.
+    /// Returns the row's name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mae => "MAE",
@@ -57,7 +57,7 @@ impl Metric {
         }
     }
 
-    /// What the value is multiplied with where it is printed: 100 for percentages.
+    /// Returns the factor by which printed values are multiplied: 100 for percentages.
     pub fn scale(self) -> f64 {
         match self {
             Self::Mae | Self::Correlation | Self::PoseDelta => 1.0,
@@ -65,15 +65,15 @@ impl Metric {
         }
     }
 
-    /// Whether the lowest value is the best.
+    /// Returns whether the lowest value is the best.
     pub fn lower_is_better(self) -> bool {
         self == Self::Mae
     }
 
-    /// Its value for one test set; `None` where it is not defined, as a correlation with constant predictions.
+    /// Returns the value for one test set; `None` if it is not defined, such as a correlation with constant predictions.
     ///
     /// # Errors
-    /// [`PredictionError`] for limbs without one good and two bad poses, where the metric asks for them, and for
+    /// [`PredictionError`] for limbs without one good and two bad poses, if the metric requires them, and for
     /// predictions that are not finite.
     pub fn value(self, rows: &[Prediction]) -> Result<Option<f64>, PredictionError> {
         let labels: Vec<_> = rows.iter().map(|row| row.label).collect();

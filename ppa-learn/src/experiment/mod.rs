@@ -1,8 +1,9 @@
-//! The paper's experiments: configurations, trainings, and tables of results.
+//! The paper's experiments: configurations, training runs, and tables of results.
 //!
-//! A [`Configuration`] is a column of a table. Each is trained for every fold, camera view and seed ([`runs`]), some on
-//! top of a pretraining that several runs share ([`Training::needs`]). The predictions of the two views are joined
-//! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]). A [`Runner`] carries all that out for an [`ExperimentPlan`].
+//! A [`Configuration`] is a column of a table. Each is trained for every fold, camera view and seed ([`runs`]), some
+//! after a pretraining that several runs share ([`Training::needs`]). The predictions of the two views are averaged
+//! ([`join_views`]), their metrics collected ([`Results`]) and printed as in the paper ([`Table`]). A [`Runner`] does all this for
+//! an [`ExperimentPlan`].
 
 mod baselines;
 mod cell;

@@ -1,4 +1,4 @@
-//! The experiment file.
+//! The plan of experiments, a TOML file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -19,18 +19,18 @@ use crate::train::{ConfigError, Source, TrainConfig, merge};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentPlan {
-    /// Number of repetitions with different seeds, at most [`MAX_PAIRS`], as the permutation test enumerates all signs of their
+    /// Number of repetitions with different seeds, at most [`MAX_PAIRS`] because the permutation test enumerates all signs of their
     /// differences; the paper has 10.
     pub seeds: u64,
     /// Seed of the division into folds, the same for all repetitions.
     #[serde(default = "first_seed")]
     pub fold_seed: u64,
-    /// Weights trained on ImageNet, by torchvision's or timm's names. Columns that begin with them are left out without it.
+    /// Weights trained on ImageNet, with torchvision's or timm's names. Columns that start from them are left out if this is not given.
     #[serde(default)]
     pub imagenet_weights: Option<PathBuf>,
-    /// How networks are trained: a preset and what differs from it. Seed, views and data are filled in.
+    /// Training configuration: a preset and the keys that differ from it. Seed, views and data are filled in.
     pub training: toml::Table,
-    /// What differs from [`training`](Self::training) in the runs of experiments 2a to 2c, from scratch or not.
+    /// Keys that differ from [`training`](Self::training) in the runs of experiments 2a to 2c, including those from scratch.
     #[serde(default)]
     pub finetuning: toml::Table,
     /// The synthetic dataset, for experiment 1 and for pretraining.
@@ -41,10 +41,10 @@ pub struct ExperimentPlan {
     /// The clinical dataset, or a substitute, for experiment 2b.
     #[serde(default)]
     pub clinical: Option<Target>,
-    /// Parts of the synthetic dataset to train with in the experiments on the amount of data.
+    /// Parts of the synthetic dataset used for training in the experiments on the amount of data.
     #[serde(default)]
     pub learning_curves: LearningCurves,
-    /// The file that said all this.
+    /// Path of the plan.
     #[serde(skip)]
     path: PathBuf,
 }
@@ -53,27 +53,27 @@ pub struct ExperimentPlan {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Synthetic {
-    /// Its folder, relative to that of the plan.
+    /// Folder of the dataset, relative to that of the plan.
     pub dataset: PathBuf,
-    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
+    /// NAME of the label file `labels.NAME.json`; `labels.json` if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labels: Option<LabelName>,
-    /// Folds of experiment 1; the paper's number is 3.
+    /// Number of folds of experiment 1; 3 in the paper.
     pub folds: usize,
-    /// Limbs that a fold tests; the paper's number is 3.
+    /// Number of limbs tested in a fold; 3 in the paper.
     pub test_limbs: usize,
 }
 
-/// A dataset to finetune and test with.
+/// A dataset for finetuning and testing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
-    /// Its folder, relative to that of the plan.
+    /// Folder of the dataset, relative to that of the plan.
     pub dataset: PathBuf,
-    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
+    /// NAME of the label file `labels.NAME.json`; `labels.json` if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labels: Option<LabelName>,
-    /// Folds, by person: the paper has 2 for the preparations and 3 for the clinical dataset.
+    /// Number of folds, divided by person; in the paper 2 for the preparations and 3 for the clinical dataset.
     pub folds: usize,
 }
 
@@ -87,7 +87,7 @@ pub struct LearningCurves {
     /// Train with every n-th angle of each limb.
     #[serde(default)]
     pub every_pose: Vec<NonZeroUsize>,
-    /// Number of their repetitions; that of the other experiments if left out.
+    /// Number of repetitions; that of the other experiments if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seeds: Option<u64>,
 }
@@ -102,13 +102,13 @@ pub struct Fold {
 }
 
 impl Synthetic {
-    /// All its persons.
+    /// Returns all persons of the dataset.
     pub(super) fn source(&self) -> Source {
         everybody(&self.dataset, &self.labels)
     }
 }
 
-/// All persons of a dataset.
+/// Returns all persons of a dataset.
 fn everybody(dataset: &Path, labels: &Option<LabelName>) -> Source {
     Source {
         dataset: dataset.to_owned(),
@@ -124,15 +124,15 @@ fn first_seed() -> u64 {
 }
 
 impl ExperimentPlan {
-    /// Whether a file is a plan of experiments, valid or not, and no other plan of ppa: only these have a table `training`.
+    /// Returns whether a file is a plan of experiments, valid or not, rather than another plan of ppa: only these have a table `training`.
     pub fn is_in(path: &Path) -> bool {
         let text = ppa_core::regular_file::read_to_string(path).unwrap_or_default();
         let table: toml::Table = toml::from_str(&text).unwrap_or_default();
-        // An array of tables in the configuration of a training.
+        // In the configuration of a training run it is an array of tables.
         table.get("training").is_some_and(toml::Value::is_table)
     }
 
-    /// Reads a TOML file; folders in it are from the folder of the file.
+    /// Reads a TOML file; folders in it are relative to the folder of the file.
     ///
     /// # Errors
     /// [`ExperimentError`] naming the file and the key.
@@ -169,7 +169,7 @@ impl ExperimentPlan {
         Ok(plan)
     }
 
-    /// Writes the plan as TOML, with whole paths.
+    /// Writes the plan as TOML, with absolute paths.
     ///
     /// # Errors
     /// [`ExperimentError`] naming the file.
@@ -181,19 +181,19 @@ impl ExperimentPlan {
         Ok(write_whole(path, text.as_bytes())?)
     }
 
-    /// How networks are trained, without data.
+    /// Returns the training configuration, without data.
     pub(super) fn training_config(&self) -> Result<TrainConfig, ConfigError> {
         TrainConfig::from_table(self.training.clone(), &self.path)
     }
 
-    /// How networks are trained with preparations or clinical images, without data.
+    /// Returns the training configuration for preparations or clinical images, without data.
     pub(super) fn finetuning_config(&self) -> Result<TrainConfig, ConfigError> {
         let mut table = self.training.clone();
         merge(&mut table, self.finetuning.clone());
         TrainConfig::from_table(table, &self.path)
     }
 
-    /// The seeds of an experiment's repetitions.
+    /// Returns the seeds of an experiment's repetitions.
     pub(super) fn seeds_of(&self, experiment: Experiment) -> Vec<u64> {
         let of_curves = self.learning_curves.seeds;
         let number = match experiment {
@@ -203,7 +203,7 @@ impl ExperimentPlan {
         (1..=number).collect()
     }
 
-    /// The columns of an experiment that can be run: without ImageNet where there is no file of its weights.
+    /// Returns the columns of an experiment that can be run: those with ImageNet only if the plan names a file of its weights.
     pub fn configurations(&self, experiment: Experiment) -> Vec<Configuration> {
         let LearningCurves {
             persons,
@@ -225,14 +225,14 @@ impl ExperimentPlan {
         columns
     }
 
-    /// The experiments for which the plan has data: the paper's, then the others.
+    /// Returns the experiments for which the plan has data: the paper's, then the others.
     pub fn experiments(&self) -> Vec<Experiment> {
         let all = Experiment::OF_PAPER.into_iter().chain(Experiment::OTHERS);
         all.filter(|&experiment| self.target(experiment).is_ok())
             .collect()
     }
 
-    /// All persons of the dataset that an experiment tests with.
+    /// Returns all persons of the dataset that an experiment uses for testing.
     ///
     /// # Errors
     /// [`ExperimentError::NoTarget`] if the plan names none.
@@ -259,7 +259,7 @@ impl ExperimentPlan {
         }
     }
 
-    /// Persons of each fold of an experiment.
+    /// Returns the persons of each fold of an experiment.
     ///
     /// # Errors
     /// [`ExperimentError`] if the dataset cannot be read, or has too few persons.

@@ -1,4 +1,4 @@
-//! Predictions of both views' networks on their test images.
+//! Predictions of the networks of both views on their test images.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,14 +11,14 @@ use serde::{Deserialize, Serialize};
 use super::error::ExperimentError;
 use crate::evaluate::{Row, triple};
 
-/// A depth image of a test set without its camera: both cameras see the same moment.
+/// Identity of a depth image of a test set without its camera: both cameras see the same moment.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Moment {
     /// N of `patient_N`.
     pub patient: u32,
-    /// Which of the person's limbs.
+    /// Side of the limb.
     pub side: Side,
-    /// The pose, unique among those of the limb.
+    /// Name of the pose, unique within the limb.
     pub pose: String,
     /// Number of the frame within the pose, from 0.
     pub frame: u32,
@@ -29,22 +29,22 @@ pub struct Moment {
 pub struct Prediction {
     /// N of `patient_N`.
     pub patient: u32,
-    /// Which of the person's limbs.
+    /// Side of the limb.
     pub side: Side,
-    /// The pose, unique among those of the limb.
+    /// Name of the pose, unique within the limb.
     pub pose: String,
     /// Number of the frame within the pose, from 0.
     pub frame: u32,
-    /// Medial rotation in degrees, where the dataset states it.
+    /// Medial rotation in degrees, if the dataset states it.
     #[serde(default)]
     pub angle_deg: Option<f64>,
     /// Quality given by readers, 1 to 3.
     pub label: f64,
-    /// Quality that the network says.
+    /// Quality predicted by the network.
     pub prediction: f64,
 }
 
-/// Why predictions of two views could not be joined or judged.
+/// Error in joining or evaluating the predictions of two views.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PredictionError {
@@ -96,7 +96,7 @@ impl fmt::Display for Moment {
 }
 
 impl Prediction {
-    /// What was seen.
+    /// Returns the moment of the image.
     pub fn moment(&self) -> Moment {
         Moment {
             patient: self.patient,
@@ -107,7 +107,7 @@ impl Prediction {
     }
 }
 
-/// What is said of an image, without its camera.
+/// Drops the camera.
 impl From<Row> for Prediction {
     fn from(row: Row) -> Self {
         Self {
@@ -122,7 +122,7 @@ impl From<Row> for Prediction {
     }
 }
 
-/// Label and prediction of each moment, the mean of the two views: y_j = (y_j^V1 + y_j^V2) / 2 (paper, section 4.4).
+/// Returns label and prediction of each moment, the mean of the two views: y_j = (y_j^V1 + y_j^V2) / 2 (paper, section 4.4).
 ///
 /// # Errors
 /// [`PredictionError`] if the views do not have the same moments and labels.
@@ -164,8 +164,8 @@ fn by_moment(rows: &[Prediction]) -> Result<BTreeMap<Moment, &Prediction>, Predi
     Ok(found)
 }
 
-/// Frame-averaged predictions of each limb's one good (label 1) and two bad (label 3) poses, as in the paper's clinical
-/// dataset.
+/// Returns the frame-averaged predictions of each limb's one good (label 1) and two bad (label 3) poses, as in the paper's
+/// clinical dataset.
 ///
 /// # Errors
 /// [`PredictionError::NoTriple`] for a limb with other poses.
@@ -203,7 +203,7 @@ struct Pose {
     frames: Vec<f64>,
 }
 
-/// The rows of a `predictions.csv`.
+/// Reads the rows of a `predictions.csv`.
 ///
 /// # Errors
 /// [`ExperimentError::Unreadable`] naming the file.
@@ -212,7 +212,7 @@ pub(super) fn read_predictions(path: &Path) -> Result<Vec<Prediction>, Experimen
         path: path.to_owned(),
         message: error.to_string(),
     };
-    // Read whole: to `csv` a header that cannot be read is an empty table.
+    // Read in full first, because `csv` takes an unreadable header for an empty table.
     let bytes = ppa_core::regular_file::read(path).map_err(|error| wrong(error.into()))?;
     let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
     rows.collect::<Result<_, _>>().map_err(wrong)

@@ -1,4 +1,4 @@
-//! Results that the paper states, to be shown next to ours.
+//! Results stated in the paper, to be shown next to ours.
 
 use super::configuration::Configuration;
 use super::metric::Metric;
@@ -6,7 +6,7 @@ use super::metric::Metric;
 /// Tables 1 to 4 of Laufer et al., MELBA 2026:027: experiment, column, metric, mean and standard deviation over ten seeds, as printed.
 const TABLES: &str = include_str!("published.csv");
 
-/// Mean and standard deviation that the paper states for a cell, as printed: shares in percent.
+/// Returns the mean and standard deviation that the paper states for a cell, as printed: shares in percent.
 pub fn published(column: Configuration, metric: Metric) -> Option<[&'static str; 2]> {
     let name = column.name();
     let metric = metric.name().trim_end_matches(" [%]");

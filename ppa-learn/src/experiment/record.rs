@@ -1,4 +1,4 @@
-//! Record of a finished training, to check that it is still the one asked for.
+//! Record of a finished training run, to check that it still matches the plan.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::error::ExperimentError;
 use crate::data::Sample;
 use crate::train::TrainConfig;
 
-/// What a finished training was: its settings without paths, and what it began with and saw.
+/// Record of a finished training run: its settings without paths, and hashes of its initial weights and data.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     pub config: TrainConfig,
@@ -18,7 +18,7 @@ pub struct Record {
     pub data_sha256: String,
 }
 
-/// The settings that the results of a training depend on.
+/// Returns the settings on which the results of a training run depend.
 pub fn without_paths(config: &TrainConfig) -> TrainConfig {
     TrainConfig {
         start: None,
@@ -28,7 +28,7 @@ pub fn without_paths(config: &TrainConfig) -> TrainConfig {
     }
 }
 
-/// A hash of what training and test sets hold, but not where they lie.
+/// Returns a hash of the content of the training and test sets, independent of their location.
 pub fn fingerprint(sets: &[Vec<Sample>; 2]) -> String {
     let mut hash = Sha256::new();
     for set in sets {
@@ -53,7 +53,7 @@ pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Exper
     })
 }
 
-/// Names the file and what was done to it.
+/// Returns a function that adds the action and the file to an I/O error.
 pub fn file<'a>(
     action: &'static str,
     path: &'a Path,

@@ -1,4 +1,4 @@
-//! Metrics of an experiment's runs, brought together over views, folds and seeds.
+//! Metrics of an experiment's runs, collected over views, folds and seeds.
 
 mod comparison;
 mod difference;
@@ -20,7 +20,7 @@ pub use difference::Difference;
 
 /// Metrics of each column's test sets.
 ///
-/// The folds of one seed are averaged first, as in the paper's test; mean and standard deviation are those of the seeds.
+/// The folds of one seed are averaged first, as in the paper's test; mean and standard deviation are taken over the seeds.
 #[derive(Debug, Clone)]
 pub struct Results {
     experiment: Experiment,
@@ -41,7 +41,7 @@ struct TestSet {
     predictions: Vec<Prediction>,
 }
 
-/// A test set without predictions that can be judged.
+/// A test set without usable predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Missing {
     /// The column.
@@ -52,16 +52,16 @@ pub struct Missing {
     pub fold: usize,
 }
 
-/// Mean over the seeds of a column.
+/// Mean and standard deviation over the seeds of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Summary {
     /// Mean over the seeds.
     pub mean: f64,
-    /// Standard deviation of the seeds, divided by n - 1; `None` for a single one.
+    /// Standard deviation over the seeds, with the divisor n - 1; `None` for a single seed.
     pub std: Option<f64>,
-    /// Seeds whose folds are all there and where the metric is defined.
+    /// Number of seeds with all folds and a defined metric.
     pub seeds: usize,
-    /// Seeds whose folds are all there, but where the metric is not defined.
+    /// Number of seeds with all folds whose metric is not defined.
     pub undefined: usize,
 }
 
@@ -81,7 +81,7 @@ impl fmt::Display for Missing {
 }
 
 impl Results {
-    /// No results yet, of the columns of an experiment that are run, with `folds` folds and these seeds.
+    /// Makes empty results for the columns of an experiment that are run, with `folds` folds and these seeds.
     pub fn new(
         experiment: Experiment,
         columns: Vec<Configuration>,
@@ -101,11 +101,11 @@ impl Results {
         }
     }
 
-    /// Adds the predictions of one test set, the views joined. One with a prediction that is not finite stays missing, and
+    /// Adds the joined predictions of one test set. A test set with a prediction that is not finite stays missing, and
     /// [`Results::not_finite`] names it.
     ///
     /// # Errors
-    /// [`PredictionError`] for predictions that cannot be judged.
+    /// [`PredictionError`] for predictions that cannot be evaluated.
     pub fn insert(
         &mut self,
         place: Missing,
@@ -126,10 +126,10 @@ impl Results {
         Ok(())
     }
 
-    /// Adds what a baseline predicts for one fold, the views joined.
+    /// Adds the joined predictions of a baseline for one fold.
     ///
     /// # Errors
-    /// [`PredictionError`] for predictions that cannot be judged.
+    /// [`PredictionError`] for predictions that cannot be evaluated.
     pub fn insert_baseline(
         &mut self,
         kind: BaselineKind,
@@ -155,42 +155,42 @@ impl Results {
         })
     }
 
-    /// The experiment.
+    /// Returns the experiment.
     pub fn experiment(&self) -> Experiment {
         self.experiment
     }
 
-    /// The columns that are run.
+    /// Returns the columns that are run.
     pub fn columns(&self) -> &[Configuration] {
         &self.columns
     }
 
-    /// Number of seeds that are planned.
+    /// Returns the number of planned seeds.
     pub fn planned_seeds(&self) -> usize {
         self.seeds.len()
     }
 
-    /// Test sets that were predicted, but not with finite numbers: a training that diverged.
+    /// Returns the test sets with predictions that are not finite: their training runs diverged.
     pub fn not_finite(&self) -> &BTreeSet<Missing> {
         &self.not_finite
     }
 
-    /// Test sets on which the network answers with a constant, and that constant.
+    /// Returns the test sets for which the network predicts a constant, and that constant.
     pub fn constant(&self) -> &BTreeMap<Missing, ConstantPrediction> {
         &self.constant
     }
 
-    /// Whether no test set has been judged yet.
+    /// Returns whether no test set has been evaluated yet.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Number of folds of each seed.
+    /// Returns the number of folds of each seed.
     pub fn folds(&self) -> usize {
         self.folds
     }
 
-    /// Test sets without predictions that can be judged.
+    /// Returns the test sets without usable predictions.
     pub fn missing(&self) -> Vec<Missing> {
         let mut missing = Vec::new();
         for &configuration in &self.columns {
@@ -209,7 +209,7 @@ impl Results {
         missing
     }
 
-    /// A metric of one seed: the mean over its folds. `None` if a fold is missing, `Some(None)` if it is not defined.
+    /// Returns the mean of a metric over the folds of one seed. `None` if a fold is missing, `Some(None)` if the metric is not defined.
     fn of_seed(&self, column: Configuration, metric: Metric, seed: u64) -> Option<Option<f64>> {
         let folds = (0..self.folds).map(|fold| self.values.get(&(column, seed, fold)));
         let folds = folds.collect::<Option<Vec<_>>>()?;
@@ -217,7 +217,7 @@ impl Results {
         Some(values.map(|values| mean(&values)))
     }
 
-    /// Mean absolute error of each person, over the seeds that are complete in all of some columns.
+    /// Returns the mean absolute error of each person, over the seeds that are complete in all columns of `complete_in`.
     fn errors_of_persons(&self, column: Configuration, complete_in: &[Configuration]) -> Vec<f64> {
         let complete = |seed: &&u64| {
             let mut columns = complete_in.iter();
@@ -230,7 +230,7 @@ impl Results {
         errors_of_persons(sets)
     }
 
-    /// Mean and standard deviation over the seeds of a column; `None` if no seed has a value.
+    /// Returns mean and standard deviation over the seeds of a column; `None` if no seed has a value.
     pub fn summary(&self, column: Configuration, metric: Metric) -> Option<Summary> {
         let there = self.seeds.iter();
         let there: Vec<_> = there
@@ -245,8 +245,8 @@ impl Results {
         })
     }
 
-    /// The predictions of a column, averaged over the seeds that are there, in the order of moments. Of a moment that several folds
-    /// test, the mean over the folds.
+    /// Returns the predictions of a column in the order of moments, averaged over the available seeds and, for a moment that several
+    /// folds test, over the folds.
     pub fn mean_predictions(&self, column: Configuration) -> Vec<Prediction> {
         let sets = self.values.iter().filter(|(key, _)| key.0 == column);
         let rows: Vec<&Prediction> = sets.flat_map(|(_, set)| &set.predictions).collect();
@@ -260,14 +260,14 @@ impl Results {
         both.map(mean).collect()
     }
 
-    /// (degrees, mean absolute error, predictions) of each angle that the dataset states, over the seeds and folds of a column.
+    /// Returns (degrees, mean absolute error, predictions) of each angle that the dataset states, over the seeds and folds of a column.
     pub fn error_by_angle(&self, column: Configuration) -> Vec<(f64, f64, usize)> {
         let sets = self.values.iter().filter(|(key, _)| key.0 == column);
         let rows = sets.flat_map(|(_, set)| &set.predictions);
         means(rows.filter_map(|row| Some((row.angle_deg?, (row.label - row.prediction).abs()))))
     }
 
-    /// The baselines that are known of every fold.
+    /// Returns the baselines that are available for every fold.
     pub fn baselines(&self) -> Vec<BaselineKind> {
         let of_first = self.baselines.keys().filter(|(_, fold)| *fold == 0);
         let kinds = of_first.map(|&(kind, _)| kind);
@@ -277,18 +277,18 @@ impl Results {
         kinds.filter(all).collect()
     }
 
-    /// Mean over the folds of a baseline, which has no seeds; `None` if the metric is not defined.
+    /// Returns the mean over the folds of a baseline, which has no seeds; `None` if the metric is not defined.
     pub fn of_baseline(&self, kind: BaselineKind, metric: Metric) -> Option<f64> {
         let folds = (0..self.folds).map(|fold| self.baselines.get(&(kind, fold))?.metrics[&metric]);
         Some(mean(&folds.collect::<Option<Vec<_>>>()?))
     }
 
-    /// Mean absolute error of labels that vary normally by their standard deviation; `None` if none varies.
+    /// Returns the mean absolute error of labels that are normally distributed with their standard deviation; `None` if all are 0.
     pub fn label_noise_mae(&self) -> Option<f64> {
         label_noise_mae(self.label_std.iter().copied())
     }
 
-    /// The paper's test of the MAE, from scratch against pretrained, paired by seed; the folds of a seed are averaged
+    /// Runs the paper's test of the MAE, from scratch against pretrained, paired by seed; the folds of a seed are averaged
     /// first. `None` for experiments without such a test.
     ///
     /// # Errors
@@ -305,7 +305,7 @@ impl Results {
     }
 }
 
-/// Mean absolute error of each person over test sets, in the order of persons.
+/// Returns the mean absolute error of each person over test sets, in the order of persons.
 fn errors_of_persons<'a>(sets: impl Iterator<Item = &'a TestSet>) -> Vec<f64> {
     let rows = sets.flat_map(|set| &set.predictions);
     let errors = rows.map(|row| (row.patient, (row.label - row.prediction).abs()));

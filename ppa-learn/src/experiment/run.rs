@@ -1,4 +1,4 @@
-//! Carries out the trainings of an experiment, each in a folder of its own, and gathers their results.
+//! Executes the training runs of an experiment, each in its own folder, and collects their results.
 
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError, create_dir_all, remove_file};
@@ -32,28 +32,28 @@ use crate::train::{
 /// Progress reported while an experiment runs.
 #[derive(Debug)]
 pub enum Event<'a> {
-    /// A training begins, or continues.
+    /// A training run starts or resumes.
     Begins {
-        /// Which one.
+        /// The training run.
         training: Training,
-        /// Its number among the runs of this share, from 1.
+        /// Its number among the selected runs, from 1.
         number: usize,
-        /// Runs of this share.
+        /// Number of selected runs.
         of: usize,
     },
-    /// It made a step.
+    /// A step was completed.
     Step(&'a Progress),
 }
 
-/// A training that is begun and not finished.
+/// An unfinished training run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Begun {
-    /// Which one; its folder's name.
+    /// The training run, serialised as its folder's name.
     #[serde(serialize_with = "as_text")]
     pub training: Training,
-    /// Steps that its checkpoint holds.
+    /// Number of steps in its checkpoint.
     pub step: u64,
-    /// Steps of the whole training.
+    /// Total number of steps.
     pub steps: u64,
 }
 
@@ -61,7 +61,7 @@ fn as_text<S: Serializer>(training: &Training, serializer: S) -> Result<S::Ok, S
     serializer.collect_str(training)
 }
 
-/// One experiment of a plan, in a folder that holds a folder for each training.
+/// Runs one experiment of a plan in a folder with a subfolder for each training run.
 #[derive(Debug)]
 pub struct Runner<'a> {
     plan: &'a ExperimentPlan,
@@ -71,7 +71,7 @@ pub struct Runner<'a> {
 }
 
 impl<'a> Runner<'a> {
-    /// An experiment of a plan in the folder `root`.
+    /// Prepares an experiment of a plan in the folder `root`.
     ///
     /// # Errors
     /// [`ExperimentError`] if its dataset is not named, cannot be read or has too few persons.
@@ -89,7 +89,7 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Its runs, those with ImageNet only if the plan has weights.
+    /// Returns the runs of the experiment, including those with ImageNet only if the plan has weights.
     pub fn runs(&self) -> Vec<Training> {
         let seeds = self.plan.seeds_of(self.experiment);
         runs(
@@ -99,13 +99,13 @@ impl<'a> Runner<'a> {
         )
     }
 
-    /// Carries out the runs that `mine` picks by their number from 0, each after the pretraining it needs. What is
-    /// finished is left as it is, what was begun continues; a training that another process makes is waited for.
+    /// Executes the runs that `mine` selects by their number from 0, each after the pretraining it needs. Finished runs
+    /// are left as they are, unfinished ones resume, and a training run of another process is waited for.
     ///
-    /// Returns whether all are finished; `stop` ends it after a step.
+    /// Returns whether all are finished; `stop` ends the work after a step.
     ///
     /// # Errors
-    /// [`ExperimentError`] naming the training.
+    /// [`ExperimentError`] naming the training run.
     pub fn run(
         &self,
         mine: impl Fn(usize) -> bool,
@@ -132,7 +132,7 @@ impl<'a> Runner<'a> {
         Ok(true)
     }
 
-    /// Carries out one training, unless it is finished.
+    /// Executes one training run unless it is finished.
     fn make(
         &self,
         training: Training,
@@ -148,7 +148,7 @@ impl<'a> Runner<'a> {
         create_dir_all(&folder).map_err(file("create", &folder))?;
         let path = folder.join("lock");
         let lock = File::create(&path).map_err(file("create", &path))?;
-        // Not with `lock`, which a signal does not end.
+        // Not with `lock`, which a signal does not interrupt.
         loop {
             match lock.try_lock() {
                 Ok(()) => break,
@@ -189,12 +189,12 @@ impl<'a> Runner<'a> {
         Ok(true)
     }
 
-    /// The folder of all trainings.
+    /// Returns the folder of all training runs.
     pub(super) fn root(&self) -> &Path {
         self.root
     }
 
-    /// Which experiment it is.
+    /// Returns the experiment.
     pub(super) fn experiment(&self) -> Experiment {
         self.experiment
     }
@@ -203,7 +203,7 @@ impl<'a> Runner<'a> {
         self.root.join(training.to_string())
     }
 
-    /// The whole configuration of a training.
+    /// Returns the complete configuration of a training run.
     pub(super) fn config(&self, training: Training) -> Result<TrainConfig, ExperimentError> {
         let all = |shapes: &[BodyShape]| Source {
             shapes: Some(shapes.to_vec()),
@@ -232,7 +232,7 @@ impl<'a> Runner<'a> {
                     }
                     _ => self.plan.training_config()?,
                 };
-                // Recorded images have no shapes; of synthetic ones the skin of the scan is tested, whatever was trained with.
+                // Recorded images have no shapes; for synthetic ones the skin of the scan is tested, whatever shapes were used in training.
                 let tested: &[BodyShape] = match experiment {
                     Experiment::Shapes => &ALTERED,
                     _ => &[BodyShape::Orig],
@@ -265,7 +265,8 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Persons to train with. Fewer ones are the first of a random order of the fold's, so that a larger number holds a smaller one's.
+    /// Returns the persons to train with. A subset consists of the first persons in a random order of the fold, so that a larger subset
+    /// contains every smaller one.
     fn training_persons(&self, fold: usize, variation: Variation) -> Vec<u32> {
         let mut persons = self.folds[fold].training.clone();
         if let Variation::Persons(n) = variation {
@@ -280,7 +281,7 @@ impl<'a> Runner<'a> {
         persons
     }
 
-    /// The weights that a training begins with.
+    /// Returns the file of initial weights of a training run.
     fn start(&self, training: Training) -> Option<PathBuf> {
         match training {
             Training::Run { configuration, .. } if configuration.start == Start::ImageNet => {
@@ -290,9 +291,9 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// What shows whether a finished training is still the one that the plan asks for.
+    /// Returns the record that tells whether a finished training run still matches the plan.
     ///
-    /// Nobody whose images the weights come from may be tested with them.
+    /// Refuses to test persons whose images were used in pretraining.
     fn record(&self, training: Training, config: &TrainConfig) -> Result<Record, TrainError> {
         let trained = samples(config, &config.training)?;
         let tested = samples(config, &config.evaluation)?;
@@ -311,7 +312,7 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Predictions of a finished run.
+    /// Returns the predictions of a run; `None` if it is not finished.
     fn predictions(&self, training: Training) -> Result<Option<Vec<Prediction>>, ExperimentError> {
         let folder = self.folder(training);
         let finished = folder.join("finished.json");
@@ -325,7 +326,7 @@ impl<'a> Runner<'a> {
         Ok(Some(read_predictions(&path)?))
     }
 
-    /// The images of both views of a tested moment, left camera first.
+    /// Returns the images of both views of a tested moment, left camera first.
     ///
     /// # Errors
     /// [`ExperimentError`] if the data cannot be read.
@@ -363,7 +364,7 @@ impl<'a> Runner<'a> {
         Ok(images)
     }
 
-    /// The trainings that are begun and not finished, pretrainings among them.
+    /// Returns the unfinished training runs, including pretraining runs.
     ///
     /// # Errors
     /// [`ExperimentError`] naming the checkpoint that cannot be read.
@@ -393,7 +394,7 @@ impl<'a> Runner<'a> {
         Ok(begun)
     }
 
-    /// What is known so far: the results of all test sets of which the column's views are finished.
+    /// Returns the results so far: those of all test sets for which the column's views are finished.
     ///
     /// # Errors
     /// [`ExperimentError`] naming predictions that cannot be read or joined.
@@ -426,7 +427,7 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// What the network of a finished training says of its test set.
+/// Returns the predictions of a finished training run's network for its test set.
 fn test(folder: &Path, config: &TrainConfig) -> Result<Vec<Row>, TrainError> {
     let (_, network) = trained(folder)?;
     let network = network.to_device(&config.device.open()?)?;

@@ -1,4 +1,4 @@
-//! Tables of results in the paper's form: mean ± standard deviation of the seeds, the best of each row in bold.
+//! Tables of results in the paper's form: mean ± standard deviation over the seeds, with the best value of each row in bold.
 
 use ppa_core::text::count;
 use ppa_metrics::LEAST_SPREAD;
@@ -10,12 +10,12 @@ use super::published::published;
 use super::results::{Comparison, Difference, Missing, Results, Summary};
 use crate::evaluate::BaselineKind;
 
-/// A table: a row for each metric, a column for each configuration and for each baseline.
+/// A table with a row for each metric and a column for each configuration and each baseline.
 #[derive(Debug, Clone)]
 pub struct Table {
     columns: Vec<Column>,
     rows: Vec<(Metric, Vec<Cell>)>,
-    /// What stands above the table, as it makes its numbers misleading.
+    /// Warning printed above the table if its numbers are misleading.
     warning: Option<String>,
     notes: Vec<String>,
 }
@@ -35,7 +35,7 @@ impl Column {
         }
     }
 
-    /// A name for rows: unique within its experiment, of lower-case letters and `-`.
+    /// Returns the name for rows, unique within the experiment, of lower-case letters and `-`.
     fn name(self) -> String {
         match self {
             Self::Network(column) => column.name(),
@@ -43,7 +43,7 @@ impl Column {
         }
     }
 
-    /// What the column's cell of a metric holds.
+    /// Returns the column's cell for a metric.
     fn cell(self, metric: Metric, results: &Results) -> Cell {
         match self {
             Self::Network(column) => Cell::new(results.summary(column, metric), metric, results),
@@ -55,23 +55,23 @@ impl Column {
 /// A cell of a table as it is printed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableCell {
-    /// Mean, and standard deviation where there are several seeds.
+    /// Mean, and standard deviation if there are several seeds.
     pub text: String,
-    /// Whether it is the best of its row.
+    /// Whether it is the best value of its row.
     pub best: bool,
     /// Mean and standard deviation that the paper states.
     pub published: Option<[&'static str; 2]>,
 }
 
-/// Why there is no table.
+/// Error for a table of incomplete results.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{} missing, the first is {first}{}", test_sets_are(*.count), diverged(*.not_finite))]
 pub struct Incomplete {
-    /// How many are missing.
+    /// Number of missing test sets.
     pub count: usize,
-    /// One of them.
+    /// The first of them.
     pub first: Missing,
-    /// One that was predicted, but not with finite numbers.
+    /// A test set with predictions that are not finite.
     pub not_finite: Option<Missing>,
 }
 
@@ -90,7 +90,7 @@ fn diverged(place: Option<Missing>) -> String {
 }
 
 impl Table {
-    /// The table of complete results.
+    /// Makes the table of complete results.
     ///
     /// # Errors
     /// [`Incomplete`] if a test set is missing.
@@ -106,7 +106,7 @@ impl Table {
         }
     }
 
-    /// The table of what there is; cells of fewer seeds than planned say how many they hold.
+    /// Makes the table of the results so far; cells with fewer seeds than planned state their number.
     pub fn so_far(results: &Results) -> Self {
         let networks = results.columns().iter().copied().map(Column::Network);
         let baselines = results.baselines().into_iter().map(Column::Baseline);
@@ -168,13 +168,13 @@ impl Table {
         }
     }
 
-    /// Headings of the columns.
+    /// Returns the headings of the columns.
     pub fn headings(&self) -> Vec<String> {
         let headings = self.columns.iter().map(|column| column.headings());
         headings.map(|levels| levels.join(", ")).collect()
     }
 
-    /// Name and cells of each row.
+    /// Returns the name and cells of each row.
     pub fn rows(&self) -> Vec<(&'static str, Vec<TableCell>)> {
         let cell = |metric: Metric, (column, cell): (&Column, &Cell)| TableCell {
             text: cell.to_text(),
@@ -194,12 +194,12 @@ impl Table {
         self.rows.iter().map(row).collect()
     }
 
-    /// What is said about the table: a warning first, where its numbers mislead.
+    /// Returns the notes on the table, first a warning if its numbers are misleading.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
         self.warning.iter().chain(&self.notes).map(String::as_str)
     }
 
-    /// As a table of Markdown, with its notes.
+    /// Formats the table as Markdown, with its notes.
     pub fn to_markdown(&self) -> String {
         let warning = self
             .warning
@@ -220,7 +220,7 @@ impl Table {
         lines.join("\n") + "\n"
     }
 
-    /// As rows of `metric,configuration,mean,std,seeds,undefined`, unrounded and not as percentages.
+    /// Formats the table as rows of `metric,configuration,mean,std,seeds,undefined`, unrounded and not as percentages.
     pub fn to_csv(&self) -> String {
         let mut text = "metric,configuration,mean,std,seeds,undefined\n".to_owned();
         for (metric, cells) in &self.rows {
@@ -242,7 +242,7 @@ impl Table {
         text
     }
 
-    /// As a `tabular` of LaTeX with the rules of the package booktabs.
+    /// Formats the table as a LaTeX `tabular` with the rules of the package booktabs.
     pub fn to_latex(&self) -> String {
         let mut lines = vec![format!(
             "\\begin{{tabular}}{{l{}}}",
@@ -262,7 +262,7 @@ impl Table {
         notes.chain(lines).collect::<Vec<_>>().join("\n") + "\n"
     }
 
-    /// One line for each level of the headings; neighbours with the same words share a cell.
+    /// Returns one line for each level of the headings; equal neighbours share a cell.
     fn latex_headings(&self) -> Vec<String> {
         let headings: Vec<_> = self
             .columns
@@ -290,7 +290,7 @@ impl Table {
     }
 }
 
-/// On how many test sets of which columns the network answers with a constant.
+/// Returns a text on the numbers of test sets, by column, for which the network predicts a constant.
 fn constant(results: &Results) -> Option<String> {
     let found = results.constant();
     let of = |column: Configuration| {

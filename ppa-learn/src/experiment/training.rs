@@ -1,4 +1,4 @@
-//! The trainings that an experiment consists of.
+//! The training runs of an experiment.
 
 use std::fmt;
 
@@ -6,10 +6,10 @@ use ppa_dataset::layout::View;
 
 use super::configuration::{Configuration, Experiment, Shapes, Start, Variation, ViewChoice};
 
-/// One training, and the test of its network where it has one.
+/// One training run, and the test of its network if it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Training {
-    /// Training with all of the synthetic dataset; several runs begin with its weights.
+    /// Training with all of the synthetic dataset; several runs start from its weights.
     Pretraining {
         /// Shapes to train with.
         shapes: Shapes,
@@ -32,7 +32,7 @@ pub enum Training {
 }
 
 impl Training {
-    /// The training of experiment 1 whose network this training tests, if it trains none itself.
+    /// Returns the run of experiment 1 whose network this run tests, if it trains none itself.
     pub fn tests_network_of(self) -> Option<Self> {
         let Self::Run {
             configuration,
@@ -60,12 +60,12 @@ impl Training {
         })
     }
 
-    /// The training that comes first: of the network that this training tests, or of the weights that it begins with.
+    /// Returns the training run that must come first: that of the network that this run tests, or of its initial weights.
     pub fn needs(self) -> Option<Self> {
         self.tests_network_of().or_else(|| self.pretraining())
     }
 
-    /// The pretraining whose weights this one begins with.
+    /// Returns the pretraining run whose weights this run starts from.
     pub fn pretraining(self) -> Option<Self> {
         let Self::Run {
             configuration,
@@ -84,7 +84,7 @@ impl Training {
     }
 }
 
-/// A folder's name: unique among all trainings of all experiments.
+/// Writes the name of the run's folder, unique among all training runs of all experiments.
 impl fmt::Display for Training {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -108,7 +108,7 @@ impl fmt::Display for Training {
     }
 }
 
-/// The runs of some columns, repetition by repetition: columns that a test pairs by seed grow together.
+/// Returns the runs of the columns, ordered by repetition, so that columns that a test pairs by seed are completed together.
 pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Training> {
     let mut runs = Vec::new();
     for &seed in seeds {
@@ -141,7 +141,7 @@ mod tests {
             .zip(Experiment::OF_PAPER)
             .flat_map(|(folds, experiment)| runs(&experiment.configurations(), folds, &seeds))
             .collect();
-        // 980 and the 60 of ImageNet in experiment 2b, which the paper's count leaves out.
+        // 980, plus the 60 with ImageNet in experiment 2b that the paper does not count.
         assert_eq!(all.len(), 1040);
         let pretrainings: BTreeSet<_> = all.iter().filter_map(|run| run.needs()).collect();
         assert_eq!(pretrainings.len(), 1100 - 980);

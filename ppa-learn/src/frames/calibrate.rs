@@ -1,4 +1,4 @@
-//! Calibration on the predictions of networks for persons whom they were not trained with.
+//! Calibration on predictions for persons who were not in the training data.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -17,27 +17,27 @@ use crate::confidence::{Descriptors, Intervals, OutOfDistributionDetector, cover
 use crate::data::{Images, Loader, Order, Sample, Views, check_split};
 use crate::train::{Source, TrainConfig, TrainError, samples, tensors};
 
-/// Share of the calibration images that do not exceed a descriptor's limit.
+/// Share of the calibration images that are within a descriptor's limit.
 const IN_DISTRIBUTION: f64 = 0.99;
-/// Maximum number of training images of a network that others are compared with.
+/// Maximum number of a network's training images that other images are compared with.
 const MAX_REFERENCES: usize = 512;
 
-/// What a calibration found.
+/// Result of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibration {
-    /// Persons of calibration.
+    /// Number of calibration persons.
     pub persons: usize,
-    /// Pairs of images.
+    /// Number of image pairs.
     pub pairs: usize,
     /// The intervals.
     pub intervals: Intervals,
-    /// Share of labels in the intervals that the other persons give, if there are enough.
+    /// Share of labels in the intervals calibrated on the other persons, if there are enough.
     pub coverage_of_left_out_persons: Option<f64>,
 }
 
 impl Confidence {
-    /// Calibrates the networks in the folders of finished trainings, as [`super::PairPredictor::new`] takes them, with the images of both
-    /// cameras of persons whom they were not trained with; `coverage` is the probability of intervals.
+    /// Calibrates the networks in the folders of finished training runs, given as for [`super::PairPredictor::new`], with images of both
+    /// cameras of persons who were not in the training data; `coverage` is the probability of the intervals.
     ///
     /// # Errors
     /// [`FramesError`] naming the folder or image that cannot be used, or the number of images that is too small.
@@ -89,27 +89,27 @@ impl Confidence {
     }
 }
 
-/// Person, label and prediction.
+/// Returns person, label and prediction.
 fn answer<'a>((sample, moment): (&'a Sample, &Moment)) -> ((&'a Path, u32), f64, f64) {
     let LimbId { patient, .. } = sample.limb;
     let person = (&*sample.dataset, patient);
     (person, sample.label, moment.prediction.quality)
 }
 
-/// What networks say of samples of both cameras.
+/// Evaluates the networks on samples of both cameras.
 fn moments(networks: &Networks, samples: &[Sample]) -> Result<Vec<Moment>, FramesError> {
     let [left, right] = networks.of_inputs();
     let batches = [left, right].map(|trained| batches(trained, samples.to_vec()));
     let [left, right] = batches;
     let mut moments = Vec::new();
     for (left, right) in left?.zip(right?) {
-        // Of the images of both cameras, each network's own.
+        // Each network gets the images of its own camera.
         moments.extend(networks.moments(&[left?.swap_remove(0), right?.swap_remove(1)])?);
     }
     Ok(moments)
 }
 
-/// At most [`MAX_REFERENCES`] training images of an input's network, evenly spread.
+/// Returns the descriptors of at most [`MAX_REFERENCES`] evenly spaced training images of an input's network.
 fn references(trained: &Trained, input: usize) -> Result<Vec<Descriptors>, FramesError> {
     let all = samples(&trained.config, &trained.config.training)?;
     let count = all.len().min(MAX_REFERENCES);
@@ -117,20 +117,20 @@ fn references(trained: &Trained, input: usize) -> Result<Vec<Descriptors>, Frame
     let mut references = Vec::new();
     for images in batches(trained, spread.collect())? {
         let (_, mut of_cameras) = trained.outputs(&images?)?;
-        // A network of one camera has images of one camera.
+        // A network of one camera has only one set of images.
         references.extend(of_cameras.swap_remove(input.min(of_cameras.len() - 1)));
     }
     Ok(references)
 }
 
-/// Images of samples as a network sees them, by camera.
+/// Loads the network inputs of samples, by camera.
 fn batches(
     trained: &Trained,
     samples: Vec<Sample>,
 ) -> Result<impl Iterator<Item = Result<Vec<Tensor>, TrainError>>, TrainError> {
     let side = trained.config.side;
     let images = Arc::new(Images::new(samples, side, 0)?);
-    // One size for both networks: their batches go together.
+    // The same size for both networks, whose batches are paired.
     let batch_size = NonZeroUsize::MIN.saturating_add(31);
     let loader = Loader::new(&images, &Order::Once, batch_size, trained.config.workers);
     let device = trained.network.device().clone();

@@ -1,4 +1,4 @@
-//! One camera of a stream.
+//! A camera of a stream.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -16,7 +16,7 @@ pub(super) struct Camera {
     roi: Roi,
     /// Whether networks see its frames mirrored left to right.
     mirrored: bool,
-    /// Columns and rows of its first frame that could be read: a region fits one size of images only.
+    /// Columns and rows of its first readable frame: a region is valid for one image size only.
     size: OnceLock<[usize; 2]>,
 }
 
@@ -30,18 +30,18 @@ impl Camera {
         }
     }
 
-    /// The same camera whose frames show the joint in another region.
+    /// Returns the same camera with another region of the joint.
     pub fn with_region(&self, roi: Roi) -> Self {
         Self::new(self.view, roi, self.mirrored)
     }
 
-    /// An image as a network of `side` x `side` inputs sees it.
+    /// Converts an image to the input of a network of `side` x `side` inputs.
     pub fn input_of(&self, image: &Raster<u16>, side: usize) -> Result<Raster<f32>, DataError> {
         let prepared = prepare(image, self.roi, self.mirrored, side)?;
         Ok(evaluation_input(&prepared, side))
     }
 
-    /// A frame as a network of `side` x `side` inputs sees it.
+    /// Reads a frame and converts it to the input of a network of `side` x `side` inputs.
     pub fn input(&self, path: &Path, side: usize) -> Result<Raster<f32>, DataError> {
         let size = match self.size.get() {
             Some(&size) => size,

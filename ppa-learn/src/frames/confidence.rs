@@ -1,4 +1,4 @@
-//! The confidence of predictions, and the file that holds it.
+//! The confidence of predictions, and its file.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::networks::Networks;
 use crate::confidence::{Descriptors, Intervals, Neighbours, OutOfDistributionDetector};
 use crate::train::TrainError;
 
-/// Key of what is not a tensor.
+/// Metadata key of everything that is not a tensor.
 const METADATA: &str = "ppa";
 /// Names of the tensors of each input's descriptors of training images: features and blocks.
 const NAMES: [[&str; 2]; 2] = [
@@ -25,34 +25,34 @@ const NAMES: [[&str; 2]; 2] = [
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confidence {
     pub(super) intervals: Intervals,
-    /// Of the left and of the right input.
+    /// Detectors of the left and the right input.
     pub(super) detectors: [OutOfDistributionDetector; 2],
     /// SHA-256 of the weights of each input's network.
     pub(super) networks: [String; 2],
 }
 
-/// What a file holds beside tensors.
+/// Content of a file other than tensors.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct State {
     intervals: Intervals,
-    /// In the order of tensors.
+    /// Limits in the order of the tensors.
     limits: [[f32; 2]; 2],
     networks: [String; 2],
 }
 
 impl Confidence {
-    /// The intervals of predictions.
+    /// Returns the intervals of predictions.
     pub fn intervals(&self) -> &Intervals {
         &self.intervals
     }
 
-    /// Distance of each input's image from training images, as a share of the limit.
+    /// Returns the distance of each input's image from the training images, as a share of the limit.
     pub(super) fn relative_distances(&self, images: &[Descriptors; 2]) -> [f32; 2] {
         [0, 1].map(|input| self.detectors[input].relative_distance(&images[input]))
     }
 
-    /// Writes all as safetensors, whole or not at all.
+    /// Writes a safetensors file atomically.
     ///
     /// # Errors
     /// [`FramesError::Confidence`] if the file cannot be written.
@@ -76,7 +76,7 @@ impl Confidence {
         write_whole(path, &bytes).map_err(|error| wrong(&error))
     }
 
-    /// Reads what was calibrated with these networks.
+    /// Reads a file that was calibrated with these networks.
     pub(super) fn read(path: &Path, networks: &Networks) -> Result<Self, FramesError> {
         let sizes = networks
             .of_inputs()
@@ -88,14 +88,14 @@ impl Confidence {
         }
     }
 
-    /// Of each input, in the order of names.
+    /// Returns the neighbours of each input, in the order of [`NAMES`].
     fn neighbours(&self) -> [[&Neighbours; 2]; 2] {
         self.detectors
             .each_ref()
             .map(|one| [&one.features, &one.blocks])
     }
 
-    /// Reads descriptors of the stated sizes, of each input.
+    /// Reads a file with descriptors of the given sizes for each input.
     fn parse(path: &Path, sizes: [[usize; 2]; 2]) -> Result<Self, String> {
         let bytes = ppa_core::regular_file::read(path).map_err(|error| error.to_string())?;
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| error.to_string())?;

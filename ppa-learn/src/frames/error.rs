@@ -1,4 +1,4 @@
-//! Why frames cannot be judged.
+//! Errors of predictions on frames.
 
 use std::path::PathBuf;
 
@@ -6,27 +6,27 @@ use crate::confidence::ConfidenceError;
 use crate::data::Views;
 use crate::train::TrainError;
 
-/// Why frames cannot be judged.
+/// Error in predicting the quality of frames or in a calibration.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FramesError {
-    /// A training that is not finished, or a frame that cannot be used.
+    /// An unfinished training run, or a frame that cannot be used.
     #[error(transparent)]
     Train(#[from] TrainError),
     /// A network for other images.
     #[error("{} was trained with views = \"{found}\", expected {expected}", run.display())]
     Views {
-        /// Folder of the training.
+        /// Folder of the training run.
         run: PathBuf,
-        /// What it was trained on.
+        /// Views it was trained on.
         found: Views,
-        /// What it could have been trained on.
+        /// Views it could have been trained on.
         expected: &'static str,
     },
-    /// A network that shows left limbs as right ones, and no side.
+    /// The network shows left limbs as right ones, but no side is given.
     #[error("{} was trained with mirror = true: state whether the frames show a left or a right limb", run.display())]
     Side {
-        /// Folder of the training.
+        /// Folder of the training run.
         run: PathBuf,
     },
     /// A frame unlike those that the networks were trained with.
@@ -37,15 +37,15 @@ pub enum FramesError {
         /// Its distance as a share of the limit.
         distance: f32,
     },
-    /// A confidence file that cannot be read, or of other networks.
+    /// A confidence file that cannot be read or belongs to other networks.
     #[error("{}: {message}", path.display())]
     Confidence {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The cause.
         message: String,
     },
-    /// Poses that give no intervals.
+    /// Poses from which no intervals can be computed.
     #[error(transparent)]
     Calibration(#[from] ConfidenceError),
     /// Too few images for the limits of the detector.
@@ -55,15 +55,15 @@ pub enum FramesError {
     FewImages {
         /// Training images of a network.
         training: usize,
-        /// Images of an input in the calibration.
+        /// Calibration images of an input.
         calibration: usize,
     },
     /// Networks of which only one shows left limbs as right ones.
     #[error("{} was trained with mirror = {left}, {} with mirror = {}; both must be equal", runs[0].display(), runs[1].display(), !left)]
     Mirror {
-        /// Folders of the left and the right camera's training.
+        /// Folders of the left and the right camera's training runs.
         runs: [PathBuf; 2],
-        /// What the first was trained with.
+        /// Setting of the first.
         left: bool,
     },
 }

@@ -1,4 +1,4 @@
-//! The pairs of frames in a folder that a recorder fills.
+//! Pairs of frames in a folder that a recorder fills.
 
 use std::collections::HashMap;
 use std::fs;
@@ -9,19 +9,19 @@ use std::time::{Duration, Instant, SystemTime};
 use ppa_dataset::FileError;
 use ppa_dataset::layout::View;
 
-/// How the last chunk of every PNG reads: no data, its name, its checksum.
+/// Bytes of the last chunk of every PNG: zero length, its name, its checksum.
 const PNG_END: [u8; 12] = *b"\0\0\0\0IEND\xaeB`\x82";
-/// A file that has not grown for so long will not be finished any more.
+/// Time after which a file that has not grown is considered final.
 const SETTLED: Duration = Duration::from_secs(1);
 
 /// Two frames of one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FramePair {
-    /// What their names have in common, such as `45.0` or `12_1700000000`.
+    /// Common part of their names, such as `45.0` or `12_1700000000`.
     pub name: String,
     /// The left and the right camera's file.
     pub files: [PathBuf; 2],
-    /// When both were found whole.
+    /// Time at which both were found complete.
     pub found: Instant,
 }
 
@@ -29,15 +29,15 @@ pub struct FramePair {
 #[derive(Debug)]
 pub struct PairFolder {
     path: PathBuf,
-    /// Names of pairs that were given out, and whether the last look found a file of theirs.
+    /// Names of pairs that were returned, and whether the last look found one of their files.
     taken: HashMap<String, bool>,
-    /// Files that are not whole yet, with their length and since when it stays.
+    /// Incomplete files, with their length and the time since which it has not changed.
     growing: HashMap<PathBuf, (u64, Instant)>,
     alone: usize,
 }
 
 impl PairFolder {
-    /// A folder of which no pair was looked at.
+    /// Watches a folder from which no pair has been returned yet.
     pub fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
@@ -47,11 +47,11 @@ impl PairFolder {
         }
     }
 
-    /// The pairs that became whole since the last look, in the order in which they were written.
+    /// Returns the pairs that have become complete since the last look, in the order in which they were written.
     ///
-    /// A file is whole when it ends as every PNG does. What has not grown for a second and does not is handed out as well, so
-    /// that its reader reports what is wrong with it. A pair is given out once as long as one of its files lies there;
-    /// files of the same name that come after a look without any are a new pair.
+    /// A file is complete when it ends with the last chunk of a PNG. An incomplete file that has not grown for a second is
+    /// returned as well, so that its reader reports the error. A pair is returned once as long as one of its files exists;
+    /// files of the same name that appear after a look without any are a new pair.
     ///
     /// # Errors
     /// [`FileError`] if the folder cannot be read.
@@ -78,7 +78,7 @@ impl PairFolder {
             }
         }
         self.taken.retain(|_, there| *there);
-        // What is not looked at again is forgotten.
+        // Files that are not seen again are forgotten.
         let before = std::mem::take(&mut self.growing);
         let mut pairs = Vec::new();
         self.alone = 0;
@@ -87,7 +87,7 @@ impl PairFolder {
                 self.alone += 1;
                 continue;
             };
-            // Both are looked at, so that both clocks run.
+            // Always checks both, so that both clocks run.
             let whole = [self.written(&left, &before), self.written(&right, &before)];
             if let [Some(first), Some(second)] = whole {
                 self.taken.insert(name.clone(), true);
@@ -103,12 +103,12 @@ impl PairFolder {
         Ok(pairs.into_iter().map(|(_, pair)| pair).collect())
     }
 
-    /// Names of which only one camera's file was there at the last look.
+    /// Returns the number of names with only one camera's file at the last look.
     pub fn alone(&self) -> usize {
         self.alone
     }
 
-    /// When a file was written, if it is whole or will not become so; a file that is gone again is not.
+    /// Returns when a file was written, if it is complete or will not become so; `None` for a file that has disappeared.
     fn written(
         &mut self,
         file: &Path,
@@ -125,7 +125,7 @@ impl PairFolder {
     }
 }
 
-/// Length of a file, when it was written, and whether it ends as a PNG.
+/// Returns the length of a file, when it was written, and whether it ends as a PNG.
 fn end_of(file: &Path) -> io::Result<(u64, SystemTime, bool)> {
     let mut file = ppa_core::regular_file::open(file)?;
     let metadata = file.metadata()?;
@@ -137,7 +137,7 @@ fn end_of(file: &Path) -> io::Result<(u64, SystemTime, bool)> {
     Ok((metadata.len(), metadata.modified()?, end == PNG_END))
 }
 
-/// Camera and common name of `depth_cam_left_NAME.png`.
+/// Returns camera and common name of `depth_cam_left_NAME.png`.
 fn view_and_name(file: &str) -> Option<(View, &str)> {
     let rest = file.strip_prefix("depth_")?.strip_suffix(".png")?;
     View::ALL
@@ -167,7 +167,7 @@ mod tests {
         put("notes.txt", b"");
         assert!(names(&mut folder).is_empty());
         assert_eq!(folder.alone(), 2);
-        // Half written: not before its end is there.
+        // A partly written file is not returned before its end is there.
         put("depth_cam_right_45.0.png", &PNG_END[..7]);
         put("depth_cam_right_orig_1_17.png", &PNG_END);
         let pairs = folder.look().unwrap();
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(names(&mut folder), ["45.0"]);
         assert_eq!((names(&mut folder).len(), folder.alone()), (0, 0));
         assert!(folder.growing.is_empty());
-        // A name that comes again after its files were gone is a new pair.
+        // A name that reappears after its files were gone is a new pair.
         let both = ["left", "right"].map(|view| format!("depth_cam_{view}_45.0.png"));
         for file in &both {
             fs::remove_file(root.path().join(file)).unwrap();

@@ -1,8 +1,8 @@
-//! Prediction on depth images as two cameras deliver them, pair by pair.
+//! Prediction on pairs of depth images from two cameras.
 //!
-//! [`PairPredictor`] holds the networks of finished trainings; [`PairFolder`] finds the pairs of a folder that a recorder fills;
-//! [`StreamJudge`] judges them as they come, or those that lines of text name.
-//! Frames are 16-bit PNG in mm, cut, resized and shifted as for evaluation.
+//! [`PairPredictor`] holds the networks of finished training runs; [`PairFolder`] finds pairs in a folder that a recorder fills;
+//! [`StreamJudge`] evaluates these pairs as they arrive, or pairs named in lines of text.
+//! Frames are 16-bit PNG files in mm, cropped, resized and shifted as for evaluation.
 
 mod calibrate;
 mod camera;

@@ -1,4 +1,4 @@
-//! The networks that judge the frames of both cameras.
+//! The networks for the frames of both cameras.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::data::Views;
 use crate::network::{InferenceNetwork, PosePrediction};
 use crate::train::{TrainConfig, TrainError, trained};
 
-/// Refuses the training in the folder `run`, on images of `views`, if its network is none for one camera's images.
+/// Refuses the training run in the folder `run`, on images of `views`, if its network is not for images of `camera`.
 ///
 /// # Errors
 /// [`FramesError::Views`].
@@ -38,37 +38,37 @@ pub fn of_camera(run: &Path, views: Views, camera: View) -> Result<(), FramesErr
     })
 }
 
-/// The networks for the left and the right input, which are the left and the right camera's images but for limbs that are mirrored.
+/// Networks for the left and the right input: the images of the left and the right camera, exchanged for mirrored limbs.
 #[derive(Debug)]
 pub(super) enum Networks {
-    /// One for each camera; their outputs are averaged.
+    /// One network for each camera; their outputs are averaged.
     Separate(Box<[Trained; 2]>),
-    /// One that takes both images.
+    /// One network that takes both images.
     Joint(Box<Trained>),
 }
 
-/// The network of a training.
+/// The network of a training run.
 #[derive(Debug, Clone)]
 pub(super) struct Trained {
-    /// Folder of the training.
+    /// Folder of the training run.
     run: PathBuf,
     pub config: TrainConfig,
     pub network: InferenceNetwork,
 }
 
-/// What networks say of one moment.
+/// Output of the networks for one moment.
 #[derive(Debug)]
 pub(super) struct Moment {
-    /// From both images.
+    /// Prediction from both images.
     pub prediction: PosePrediction,
-    /// From each image alone, unless one network takes both.
+    /// Quality from each image alone, unless one network takes both.
     pub alone: Option<[f64; 2]>,
     /// Descriptors of each image.
     pub images: [Descriptors; 2],
 }
 
 impl Networks {
-    /// Those in the folders of finished trainings: the left and the right camera's, or one of a unified view or of pairs.
+    /// Opens the folders of finished training runs: those of the left and the right camera, or one of a unified view or of pairs.
     pub fn open(
         left: &Path,
         right: Option<&Path>,
@@ -100,7 +100,7 @@ impl Networks {
         Ok(Self::Separate([of_left, of_right].into()))
     }
 
-    /// The training of each input's network.
+    /// Returns the network of each input.
     pub fn of_inputs(&self) -> [&Trained; 2] {
         match self {
             Self::Separate(networks) => networks.each_ref(),
@@ -108,7 +108,7 @@ impl Networks {
         }
     }
 
-    /// What they say of moments, from each input's images [moments, 1, side, side].
+    /// Evaluates moments, from each input's images [moments, 1, side, side].
     pub fn moments(&self, images: &[Tensor; 2]) -> Result<Vec<Moment>, TrainError> {
         let moment = |prediction, alone, images| Moment {
             prediction,
@@ -158,13 +158,13 @@ impl Trained {
         })
     }
 
-    /// SHA-256 of its file of weights.
+    /// Returns the SHA-256 of the weight file.
     pub fn sha256(&self) -> Result<String, TrainError> {
         let weights = self.run.join("weights.safetensors");
         Ok(sha256_of_file(&weights)?)
     }
 
-    /// What the network says of moments, and descriptors of each of its cameras' images.
+    /// Returns the network's predictions for moments, and descriptors of each camera's images.
     pub fn outputs(&self, images: &[Tensor]) -> Result<Outputs, TrainError> {
         let features = self.network.features(images)?;
         let predictions = PosePrediction::of(&self.network.classify(&features)?)?;
@@ -183,10 +183,10 @@ impl Trained {
     }
 }
 
-/// A prediction of each moment; images by camera and moment.
+/// Prediction of each moment, and descriptors by camera and moment.
 type Outputs = (Vec<PosePrediction>, Vec<Vec<Descriptors>>);
 
-/// The paper's answer for a pose.
+/// Returns the paper's prediction for a pose: the mean of both cameras.
 fn mean(left: PosePrediction, right: PosePrediction) -> PosePrediction {
     let corrections = left.correction_deg.zip(right.correction_deg);
     PosePrediction {

@@ -1,4 +1,4 @@
-//! Predictions on the frames of both cameras.
+//! Predictions for the frames of both cameras.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,32 +17,32 @@ use crate::DeviceName;
 use crate::data::{DataError, Raster};
 use crate::train::TrainError;
 
-/// Quality of a pose from 1 (ideal) to 3 (inadequate), as networks see it.
+/// Predicted quality of a pose, from 1 (ideal) to 3 (inadequate).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairPrediction {
-    /// From the left camera's frame alone, unless one network judges both together.
+    /// Quality from the left camera's frame alone, unless one network takes both frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<f64>,
-    /// From the right camera's frame alone.
+    /// Quality from the right camera's frame alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub right: Option<f64>,
-    /// The mean of both, which is the paper's answer for a pose, or what the network says of both together.
+    /// Mean of both, which is the paper's prediction for a pose, or the prediction of one network for both frames.
     pub quality: f64,
-    /// Medial rotation in degrees that would bring the limb into its best pose, laterally where negative: from networks that predict
-    /// it, the mean of both.
+    /// Medial rotation in degrees that would bring the limb into its best pose, lateral if negative: the mean of both networks, if they
+    /// predict it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction_deg: Option<f64>,
-    /// How far the quality can be trusted, if that was calibrated.
+    /// Confidence in the quality, if it was calibrated.
     #[serde(flatten)]
     pub trust: Option<Trust>,
 }
 
-/// How far a quality can be trusted.
+/// Confidence in a quality.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Trust {
     /// Interval that contains the label with the probability of the calibration.
     pub interval: [f64; 2],
-    /// What the interval says of the pose.
+    /// Whether the pose is diagnostic according to the interval.
     pub diagnostic: Answer,
 }
 
@@ -50,16 +50,16 @@ pub struct Trust {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
-    /// The interval lies below 2.5.
+    /// The interval is below 2.5.
     Yes,
-    /// The interval lies at 2.5 or above.
+    /// The interval is at or above 2.5.
     No,
     /// The interval contains both.
     NotSure,
 }
 
 impl Trust {
-    /// What an interval says.
+    /// Derives the answer from an interval.
     fn of(interval: [f64; 2]) -> Self {
         let diagnostic = match interval {
             [_, high] if high < NON_DIAGNOSTIC => Answer::Yes,
@@ -73,21 +73,21 @@ impl Trust {
     }
 }
 
-/// The networks that judge the frames of both cameras.
+/// Predicts the quality from the frames of both cameras.
 #[derive(Debug)]
 pub struct PairPredictor {
     networks: Arc<Networks>,
     /// The camera of the left and of the right input.
     inputs: [Camera; 2],
-    /// Place of each input's frame in a pair: exchanged for limbs that are mirrored.
+    /// Index of each input's frame in a pair: exchanged for mirrored limbs.
     frames: [usize; 2],
     confidence: Option<Arc<Confidence>>,
 }
 
 impl PairPredictor {
-    /// The networks in the folders of finished trainings, and where each camera's frames show the joint: the left and the
-    /// right camera's network, as in the paper, or one network of a unified view or of pairs. `side` is that of the limb in the frames;
-    /// networks that were trained with `mirror` need it.
+    /// Opens the networks in the folders of finished training runs: the left and the right camera's network, as in the paper, or one
+    /// network of a unified view or of pairs. `regions` are the regions of the joint in each camera's frames. `side` is the side of the
+    /// limb; networks that were trained with `mirror` need it.
     ///
     /// # Errors
     /// [`FramesError`] naming the folder, or the device that cannot be used.
@@ -100,7 +100,7 @@ impl PairPredictor {
     ) -> Result<Self, FramesError> {
         let networks = Networks::open(left, right, device)?;
         let run = left.to_owned();
-        // Left limbs are shown as right ones: the left camera's frame is then that of the right input.
+        // If a left limb is shown as a right one, the left camera's frame goes to the right input.
         let mirrored = match (networks.of_inputs()[0].config.mirror, side) {
             (true, None) => return Err(FramesError::Side { run }),
             (true, Some(side)) => side == Side::Left,
@@ -116,7 +116,7 @@ impl PairPredictor {
         })
     }
 
-    /// With intervals, and without answers for frames unlike the training images, as a file says that was calibrated with the same networks.
+    /// Adds intervals, and refuses frames unlike the training images, according to a confidence file calibrated with the same networks.
     ///
     /// # Errors
     /// [`FramesError::Confidence`].
@@ -125,7 +125,7 @@ impl PairPredictor {
         Ok(Self { confidence, ..self })
     }
 
-    /// The same networks for frames that show the joint elsewhere.
+    /// Returns a predictor with the same networks and other regions of the joint.
     #[must_use]
     pub fn with_regions(&self, regions: [Roi; 2]) -> Self {
         let input = |input: usize| self.inputs[input].with_region(regions[self.frames[input]]);
@@ -137,7 +137,7 @@ impl PairPredictor {
         }
     }
 
-    /// Reads the left and the right camera's frame and judges them, each on a thread of its own where there are two.
+    /// Reads the left and the right camera's frame and predicts the quality, both cameras in parallel.
     ///
     /// # Errors
     /// [`FramesError`] naming the frame that cannot be used.
@@ -149,7 +149,7 @@ impl PairPredictor {
         self.judge(image, frames.map(Path::to_owned))
     }
 
-    /// Judges depth images of the left and the right camera, mm, 0 invalid.
+    /// Predicts the quality from depth images of the left and the right camera in mm, 0 invalid.
     ///
     /// # Errors
     /// [`FramesError`] for a region outside an image, or images unlike those of the training.
@@ -162,7 +162,7 @@ impl PairPredictor {
         self.judge(image, names.map(PathBuf::from))
     }
 
-    /// Judges what the networks see at their inputs, `image` of an input and of the side that its network wants; `frames` are for messages.
+    /// Predicts from the inputs that `image` returns for an input number and the side of its network; `frames` are for error messages.
     fn judge(
         &self,
         image: impl Fn(usize, usize) -> Result<Raster<f32>, DataError> + Sync,
@@ -197,7 +197,7 @@ impl PairPredictor {
     }
 }
 
-/// An image as a tensor [1, 1, side, side] on a device.
+/// Returns an image as a tensor [1, 1, side, side] on a device.
 fn tensor(image: Raster<f32>, side: usize, device: &Device) -> Result<Tensor, TrainError> {
     let values = image.into_values();
     Ok(Tensor::from_vec(values, (1, 1, side, side), device)?)

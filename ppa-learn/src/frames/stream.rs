@@ -1,4 +1,4 @@
-//! Judgement of a stream of pairs: what was answered, what was skipped, and how long it took.
+//! Predictions for a stream of pairs: answers, skipped pairs and latencies.
 
 use std::io::{self, BufRead};
 use std::ops::ControlFlow;
@@ -12,10 +12,10 @@ use super::error::FramesError;
 use super::folder::{FramePair, PairFolder};
 use super::predictor::{PairPrediction, PairPredictor};
 
-/// Between two looks into a folder.
+/// Pause between two looks into a folder.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Why a pair of a stream is skipped.
+/// Error for which a pair of a stream is skipped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkippedPair {
@@ -25,14 +25,14 @@ pub enum SkippedPair {
     /// A line that names no pair.
     #[error("line {number} is {found:?}, expected two paths in UTF-8 with a tab between them")]
     Line {
-        /// Its number, from 1.
+        /// Number of the line, from 1.
         number: usize,
-        /// What it holds.
+        /// Content of the line.
         found: String,
     },
 }
 
-/// Why a stream ends before its end.
+/// Error that ends a stream early.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StreamError {
@@ -42,7 +42,7 @@ pub enum StreamError {
     /// Standard input cannot be read.
     #[error("cannot read standard input")]
     Lines(#[source] io::Error),
-    /// An answer cannot be handed on.
+    /// An answer cannot be passed on.
     #[error(transparent)]
     Answer(#[from] io::Error),
 }
@@ -52,33 +52,33 @@ pub enum StreamError {
 pub struct StreamAnswer<'a> {
     /// Name of the pair.
     pub name: &'a str,
-    /// What the networks say.
+    /// Prediction of the networks.
     #[serde(flatten)]
     pub prediction: PairPrediction,
-    /// From when the pair was found to the answer.
+    /// Time from finding the pair to the answer, in ms.
     pub latency_ms: f64,
 }
 
 /// Counts, rate and latencies of a stream.
 #[derive(Debug, Serialize)]
 pub struct StreamSummary {
-    /// Pairs that were answered.
+    /// Number of answered pairs.
     pub pairs: usize,
-    /// Pairs that could not be used.
+    /// Number of pairs that could not be used.
     pub skipped: usize,
-    /// Frames without the other camera's.
+    /// Number of frames without one of the other camera.
     pub alone: usize,
-    /// Pairs that were found, but not judged before the end.
+    /// Number of pairs that were found but not evaluated before the end.
     pub unjudged: usize,
-    /// From when the first pair was found to the last answer.
+    /// Answered pairs per second, from finding the first pair to the last answer.
     pub pairs_per_s: Option<f64>,
-    /// The median of the latencies.
+    /// Median latency in ms.
     pub median_latency_ms: Option<f64>,
-    /// 95 % of the latencies are not longer.
+    /// 95th percentile of the latencies in ms.
     pub latency_95_ms: Option<f64>,
 }
 
-/// Judges the pairs of a stream and hands each answer, or why there is none, to `on_answer`, which ends the stream with
+/// Predicts the quality of the pairs of a stream and passes each answer or error to `on_answer`, which ends the stream with
 /// [`ControlFlow::Break`].
 #[derive(Debug)]
 pub struct StreamJudge<F> {
@@ -98,7 +98,7 @@ impl<F> StreamJudge<F>
 where
     F: FnMut(Result<StreamAnswer, SkippedPair>) -> io::Result<ControlFlow<()>>,
 {
-    /// A stream of which nothing was judged.
+    /// Starts a stream.
     pub fn new(predictor: PairPredictor, on_answer: F) -> Self {
         Self {
             predictor,
@@ -112,10 +112,10 @@ where
         }
     }
 
-    /// Judges what is and comes in a folder until `is_ended` says so, which is asked before every pair.
+    /// Evaluates the present and future pairs of a folder until `is_ended`, called before every pair, returns true.
     ///
     /// # Errors
-    /// [`StreamError`] if the folder cannot be read or an answer cannot be handed on.
+    /// [`StreamError`] if the folder cannot be read or an answer cannot be passed on.
     pub fn folder(
         &mut self,
         folder: &Path,
@@ -142,10 +142,10 @@ where
         Ok(())
     }
 
-    /// Judges the pairs that the lines of standard input name: the path of the left frame, a tab, the path of the right frame.
+    /// Evaluates the pairs named in the lines of standard input: the path of the left frame, a tab, the path of the right frame.
     ///
     /// # Errors
-    /// [`StreamError`] if a line cannot be read or an answer cannot be handed on.
+    /// [`StreamError`] if a line cannot be read or an answer cannot be passed on.
     pub fn lines(&mut self, input: impl BufRead) -> Result<(), StreamError> {
         for (index, line) in input.split(b'\n').enumerate() {
             let line = line.map_err(StreamError::Lines)?;
@@ -193,7 +193,7 @@ where
         }))
     }
 
-    /// What was judged so far.
+    /// Returns the summary of the stream so far.
     pub fn summary(mut self) -> StreamSummary {
         self.latencies_ms.sort_by(f64::total_cmp);
         let pairs = self.latencies_ms.len();
@@ -210,7 +210,7 @@ where
     }
 }
 
-/// Percentile of sorted values: the least value that `percent` of them do not exceed.
+/// Returns a percentile of sorted values: the smallest value that `percent` of them do not exceed.
 fn percentile(sorted: &[f64], percent: usize) -> Option<f64> {
     let rank = (sorted.len() * percent).div_ceil(100);
     Some(sorted[rank.checked_sub(1)?])

@@ -4,7 +4,7 @@ use pulp::{Simd, WithSimd};
 
 use super::simd::{dispatch, fma, lanes, lanes_mut, sigmoid, silu_and_derivative};
 
-/// y = scale x + shift for each channel, which is what a normalisation with known moments amounts to.
+/// y = scale x + shift for each channel: a normalisation with known moments.
 #[derive(Debug, Clone, Default)]
 pub struct Affine {
     pub scale: Vec<f32>,
@@ -15,7 +15,7 @@ pub struct Affine {
 pub fn add_moments(pixels: &[f32], center: &[f32], sums: &mut [f64]) {
     let channels = center.len();
     let mut part = vec![0.0; 2 * channels];
-    // Few enough values that their f32 sum is good to 1e-6.
+    // Few enough values that their f32 sum is accurate to 1e-6.
     for pixels in pixels.chunks(64 * channels) {
         part.fill(0.0);
         dispatch(
@@ -62,7 +62,7 @@ impl WithSimd for Moments<'_> {
     }
 }
 
-/// out = SiLU(affine(x)), times the gate of its channel where there is one.
+/// out = SiLU(affine(x)), times the gate of its channel if there are gates.
 pub fn activate(pixels: &[f32], affine: &Affine, gate: Option<&[f32]>, out: &mut [f32]) {
     dispatch(
         affine.scale.len(),
@@ -146,7 +146,7 @@ impl WithSimd for Squeeze<'_> {
     }
 }
 
-/// out = gain affine(x), plus what the block was given where it adds it.
+/// out = gain affine(x), plus the block's input if it is added.
 pub fn normalise(
     pixels: &[f32],
     affine: &Affine,
@@ -172,7 +172,7 @@ pub fn normalise(
     }
 }
 
-/// SiLU(affine(x)) and its derivative by y.
+/// Computes SiLU(y) and its derivative with respect to y = affine(x).
 pub fn activate_with_derivative(
     pixels: &[f32],
     affine: &Affine,

@@ -1,16 +1,16 @@
-//! Reused blocks of memory: fresh ones would cost a page fault every 4 KiB, as much time as the arithmetic.
+//! Reused blocks of memory: new ones would cost a page fault every 4 KiB, as much time as the arithmetic.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Bytes of a cache line; vectors that begin on one never straddle two.
+/// Bytes of a cache line; aligned vectors never straddle two lines.
 const LINE: usize = 64;
 
-/// Blocks that were given back.
+/// Pool of returned blocks.
 #[derive(Debug, Clone, Default)]
 pub struct Pool(Arc<Mutex<Vec<Vec<f32>>>>);
 
-/// A block of f32 that begins on a cache line and goes back to its pool.
+/// A block of f32 that is aligned to a cache line and returns to its pool when dropped.
 #[derive(Debug)]
 pub struct Buffer {
     block: Vec<f32>,
@@ -20,11 +20,11 @@ pub struct Buffer {
 }
 
 impl Pool {
-    /// `len` values, of any content.
+    /// Returns a buffer of `len` values of unspecified content.
     pub fn take(&self, len: usize) -> Buffer {
         let slack = LINE / size_of::<f32>();
         let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        // The smallest block that will do, unless more than half of it would lie idle.
+        // The smallest block that is large enough, unless more than half of it would be unused.
         let best = (0..free.len())
             .filter(|&i| (len + slack..=2 * len + slack).contains(&free[i].len()))
             .min_by_key(|&i| free[i].len());

@@ -1,4 +1,4 @@
-//! Convolution of each channel by itself, forward, row by row.
+//! Forward depthwise convolution, row by row.
 
 use pulp::{Simd, WithSimd};
 
@@ -21,13 +21,13 @@ impl Window {
         (self.kernel - 1) / 2
     }
 
-    /// Length of the output of a side of `len`.
+    /// Returns the output length for an input side of `len`.
     pub fn output(self, len: usize) -> usize {
         (len - 1) / self.stride + 1
     }
 }
 
-/// Runs a kernel generic in (kernel, stride) for the windows that the network has.
+/// Runs a kernel that is generic in (kernel, stride), for the windows used in the network.
 macro_rules! for_window {
     ($window:expr, $channels:expr, $kernel:ident { $($field:tt)* }) => {
         match ($window.kernel, $window.stride) {
@@ -41,7 +41,7 @@ macro_rules! for_window {
 }
 pub(crate) use for_window;
 
-/// One row of the output [width, channels] from `kernel` rows of the input [width + 2 padding, channels].
+/// Computes one row of the output [width, channels] from `kernel` rows of the input [width + 2 padding, channels].
 ///
 /// `weights` is [kernel, kernel, channels].
 pub fn forward_row(
@@ -96,7 +96,7 @@ impl<const K: usize, const STRIDE: usize> WithSimd for ForwardRow<'_, K, STRIDE>
     }
 }
 
-/// `B` pixels of a row from `x` on, all channels.
+/// Computes `B` pixels of a row from `x` on, all channels.
 #[inline(always)]
 fn forward_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
     simd: S,
@@ -123,7 +123,7 @@ fn forward_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
     }
 }
 
-/// [channels, kernel, kernel] as [kernel, kernel, channels].
+/// Transposes [channels, kernel, kernel] to [kernel, kernel, channels].
 pub fn channels_last(weights: &[f32], channels: usize) -> Vec<f32> {
     let taps = weights.len() / channels;
     let mut turned = vec![0.0; weights.len()];
@@ -135,7 +135,7 @@ pub fn channels_last(weights: &[f32], channels: usize) -> Vec<f32> {
     turned
 }
 
-/// [kernel, kernel, channels] as [channels, kernel, kernel].
+/// Transposes [kernel, kernel, channels] to [channels, kernel, kernel].
 pub fn channels_first(weights: &[f32], channels: usize) -> Vec<f32> {
     let taps = weights.len() / channels;
     (0..weights.len())
@@ -143,9 +143,9 @@ pub fn channels_first(weights: &[f32], channels: usize) -> Vec<f32> {
         .collect()
 }
 
-/// A few padded rows of an image: row `y` takes the place of row `y - count`.
+/// Ring buffer of padded rows of an image: row `y` replaces row `y - count`.
 pub struct Rows {
-    /// A row of zeros and then the rows.
+    /// A row of zeros, followed by the rows.
     values: Buffer,
     pub count: usize,
     pub height: usize,
@@ -154,7 +154,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Room for the rows of images, to be cleared before each image.
+    /// Allocates `count` rows, to be cleared before each image.
     pub fn new(
         pool: &Pool,
         count: usize,
@@ -173,7 +173,7 @@ impl Rows {
         }
     }
 
-    /// Makes all values zero.
+    /// Sets all values to zero.
     pub fn clear(&mut self) {
         self.values.fill(0.0);
     }
@@ -182,13 +182,13 @@ impl Rows {
         (1 + y % self.count) * self.row
     }
 
-    /// Where row `y` goes, without its padding.
+    /// Returns the place of row `y`, without its padding.
     pub fn place(&mut self, y: usize) -> &mut [f32] {
         let start = self.start(y);
         &mut self.values[start + self.margin..start + self.row - self.margin]
     }
 
-    /// Row `y` with its padding; zeros above and below the image.
+    /// Returns row `y` with its padding; zeros above and below the image.
     pub fn padded(&self, y: isize) -> &[f32] {
         match usize::try_from(y) {
             Ok(y) if y < self.height => &self.values[self.start(y)..][..self.row],
@@ -196,7 +196,7 @@ impl Rows {
         }
     }
 
-    /// Row `y` of the image without its padding.
+    /// Returns row `y` of the image without its padding.
     pub fn inner(&self, y: usize) -> &[f32] {
         &self.values[self.start(y)..][self.margin..self.row - self.margin]
     }

@@ -5,7 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::depthwise::{Window, for_window};
 use super::simd::{dispatch, fma, lanes, lanes_mut};
 
-/// Adds to the gradient of the weights [kernel, kernel, channels] what one row of the output gives.
+/// Adds the contribution of one output row to the gradient of the weights [kernel, kernel, channels].
 ///
 /// `rows` are the padded rows of the input, `gradient` the gradient of the output row without padding.
 pub fn add_weight_gradient(
@@ -56,7 +56,7 @@ impl<const K: usize, const STRIDE: usize> WithSimd for WeightRow<'_, K, STRIDE> 
     }
 }
 
-/// What `B` pixels of a row from `x` on give, all channels.
+/// Adds the contribution of `B` pixels of a row from `x` on, all channels.
 #[inline(always)]
 fn weight_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
     simd: S,
@@ -84,18 +84,18 @@ fn weight_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
 
 /// Gradient of one input row of a depthwise convolution, through the activation before it.
 pub struct InputRow<'a> {
-    /// The padded rows of the output's gradient that row `y` of the input contributed to, each with its row of the kernel.
+    /// The padded rows of the output's gradient to which row `y` of the input contributed, each with its row of the kernel.
     pub rows: &'a [(usize, &'a [f32])],
     /// [kernel, kernel, channels].
     pub weights: &'a [f32],
     /// Derivative of the activation at each value of the row.
     pub derivative: &'a [f32],
-    /// What was normalised and activated, and each channel's mean.
+    /// Values before normalisation and activation, and each channel's mean.
     pub pixels: &'a [f32],
     pub mean: &'a [f32],
     /// The gradient of the activation's input.
     pub out: &'a mut [f32],
-    /// For each channel the sum of `out`, then for each the sum of `out` (pixels - mean): both are added to.
+    /// Accumulated sums of `out` of each channel, then of `out` (pixels - mean) of each channel.
     pub sums: &'a mut [f32],
 }
 
@@ -156,8 +156,8 @@ impl<const K: usize, const STRIDE: usize> WithSimd for Gather<'_, K, STRIDE> {
     }
 }
 
-/// Input pixel x takes from output pixel (x + p - kx) / stride where that is whole; p is the padding, which is also the
-/// output rows' here.
+/// Input pixel x receives from output pixel (x + p - kx) / stride if that is an integer; p is the padding, here also of the
+/// output rows.
 #[inline(always)]
 fn gather_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
     simd: S,

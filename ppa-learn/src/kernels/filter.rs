@@ -1,4 +1,4 @@
-//! Depthwise convolution in inference, normalised, activated and pooled before it leaves the registers.
+//! Depthwise convolution in inference; its output is normalised, activated and pooled in registers.
 
 use pulp::{Simd, WithSimd};
 
@@ -13,14 +13,14 @@ use super::simd::{dispatch, fma, lanes, silu, store};
 #[derive(Debug)]
 pub struct Taps {
     values: Buffer,
-    /// Of each channel, zeros after the last one.
+    /// Shift of each channel, with zeros after the last one.
     shift: Vec<f32>,
     window: Window,
     channels: usize,
 }
 
 impl Taps {
-    /// Of weights [channels, kernel, kernel] and the normalisation of their output.
+    /// Lays out weights [channels, kernel, kernel] with the normalisation of their output.
     pub fn new(window: Window, weight: &[f32], affine: &Affine, pool: &Pool) -> Self {
         let channels = affine.scale.len();
         let taps = window.kernel * window.kernel;
@@ -42,7 +42,7 @@ impl Taps {
     }
 }
 
-/// SiLU(convolution) [output rows, width, channels] of rows from `first` on, and the sum of each output row [output rows, channels].
+/// Computes SiLU(convolution) [output rows, width, channels] of rows from `first` on, and the sums [output rows, channels] of the rows.
 pub fn filter_rows(taps: &Taps, rows: &PanelRows, first: isize, out: &mut [f32], sums: &mut [f32]) {
     for_window!(
         taps.window,
@@ -82,8 +82,8 @@ impl<const K: usize, const STRIDE: usize> WithSimd for FilterRows<'_, K, STRIDE>
     }
 }
 
-/// Pixels of a row that are summed at once, each in its register: at least six where the row has as many, so that no sum waits for the one
-/// before, and of these numbers the one with the least overlap at the end of the row.
+/// Returns the number of pixels of a row that are summed at once, each in its register: at least six if the row has as many, so that no
+/// sum waits for the one before, and among these the number with the least overlap at the end of the row.
 fn pixels_at_once(width: usize) -> usize {
     let fitting = [8, 7, 6, 3, 2, 1].into_iter().filter(|&b| b <= width);
     fitting
@@ -92,7 +92,8 @@ fn pixels_at_once(width: usize) -> usize {
 }
 
 impl<const K: usize, const STRIDE: usize> FilterRows<'_, K, STRIDE> {
-    /// Panel by panel, whose rows stay in the first-level cache, and `B` pixels at a time. The last ones of a row overlap those before them.
+    /// Works panel by panel, so that rows stay in the first-level cache, and on `B` pixels at a time. The last pixels of a row overlap the
+    /// ones before them.
     #[inline(always)]
     fn tiles<S: Simd, const B: usize>(self, simd: S, rows: usize) {
         let channels = self.taps.channels;
@@ -131,7 +132,7 @@ impl<const K: usize, const STRIDE: usize> FilterRows<'_, K, STRIDE> {
     }
 }
 
-/// The convolution at `B` pixels from `x` on, for vector `v` of a panel.
+/// Computes the convolution at `B` pixels from `x` on, for vector `v` of a panel.
 #[inline(always)]
 fn tile<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
     simd: S,
@@ -144,7 +145,7 @@ fn tile<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
     let vectors = PANEL / S::F32_LANES;
     let mut sums = [shift; B];
     for ky in 0..K {
-        // Of known length, so that its bounds are checked once.
+        // Slices of known length, so that bounds are checked once.
         let row = &rows[ky][x * STRIDE * vectors..][..((B - 1) * STRIDE + K) * vectors];
         let taps = &taps[ky * K * vectors..][..K * vectors];
         for kx in 0..K {
@@ -162,7 +163,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// An image in rows that take the place of earlier ones, and the output rows that are computed before they do.
+    /// Filters an image through a ring buffer of rows, computing the output rows before their input is overwritten.
     fn by<S: Simd>(
         simd: Option<S>,
         taps: &Taps,

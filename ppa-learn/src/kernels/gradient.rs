@@ -17,7 +17,7 @@ pub struct Linear {
     pub constant: Vec<f32>,
 }
 
-/// out = `linear` of the gradient times `gain` and of the pixels.
+/// out = `linear` applied to the gradient times `gain` and to the pixels.
 pub fn combine(gradient: &[f32], pixels: &[f32], linear: &Linear, gain: f32, out: &mut [f32]) {
     dispatch(
         linear.constant.len(),
@@ -68,7 +68,7 @@ impl WithSimd for Combine<'_> {
     }
 }
 
-/// Adds sum g and sum g (x - mean) of each channel to the first and the second half of `sums`, where g is the gradient times `gain`.
+/// Adds sum g and sum g (x - mean) of each channel to the first and second half of `sums`, where g is the gradient times `gain`.
 pub fn add_gradient_sums(
     gradient: &[f32],
     pixels: &[f32],
@@ -120,10 +120,10 @@ impl WithSimd for GradientSums<'_> {
     }
 }
 
-/// Sums over the pixels of one image, for each channel, that the gradient of a gated activation a = SiLU(y), y = affine(x), needs.
+/// Sums over the pixels of one image, for each channel, for the gradient of a gated activation a = SiLU(y), y = affine(x).
 ///
-/// u is the gradient of the gated activation. Gate and pooled gradient are the same for all pixels of an image, so that
-/// everything that depends on them follows from these sums once they are known.
+/// u is the gradient of the gated activation. Gate and pooled gradient are the same for all pixels of an image, so
+/// everything that depends on them follows from these sums.
 #[derive(Debug, Clone)]
 pub struct ActivationSums {
     /// sum u a
@@ -143,7 +143,7 @@ impl ActivationSums {
         }
     }
 
-    /// Adds a run of pixels of the image; without `upstream` u is 0.
+    /// Adds a run of pixels of the image; u is 0 if `upstream` is `None`.
     pub fn add(&mut self, upstream: Option<&[f32]>, pixels: &[f32], affine: &Affine, mean: &[f32]) {
         let channels = mean.len();
         let mut part = vec![0.0; 5 * channels];
@@ -203,7 +203,7 @@ impl WithSimd for Sums<'_> {
     }
 }
 
-/// Gradient of x through normalisation and SiLU, where that of the activation is upstream * gate + pooled.
+/// Gradient of x through normalisation and SiLU, if the gradient of the activation is upstream * gate + pooled.
 pub struct ActivationGradient<'a> {
     pub upstream: Option<&'a [f32]>,
     pub pixels: &'a [f32],

@@ -1,7 +1,7 @@
-//! Products of matrices by the gemm crate, behind checked shapes.
+//! Matrix products by the gemm crate, with checked shapes.
 #![allow(unsafe_code)]
 
-/// A matrix in row-major order, or the transpose of one.
+/// A matrix in row-major order, or its transpose.
 #[derive(Clone, Copy)]
 pub struct Matrix<'a> {
     values: &'a [f32],
@@ -11,7 +11,7 @@ pub struct Matrix<'a> {
 }
 
 impl<'a> Matrix<'a> {
-    /// `values` in rows of `columns`.
+    /// Makes a matrix from `values` in rows of `columns`.
     pub fn new(values: &'a [f32], columns: usize) -> Self {
         assert!(values.len().is_multiple_of(columns));
         Self {
@@ -31,7 +31,7 @@ impl<'a> Matrix<'a> {
         }
     }
 
-    /// Steps to the next column and to the next row.
+    /// Returns the strides to the next column and to the next row.
     fn strides(&self) -> (isize, isize) {
         if self.transposed {
             (self.rows as isize, 1)
@@ -41,7 +41,7 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// Whether a product replaces what is there or is added to it.
+/// Whether a product replaces the output or is added to it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Store {
     Replace,

@@ -1,12 +1,12 @@
-//! A few rows of an image whose channels are stored in separate panels, as a depthwise convolution reads them.
+//! Ring buffer of image rows with channels in separate panels, in the order in which a depthwise convolution reads them.
 
 use super::buffer::{Buffer, Pool};
 use super::panels::PANEL;
 
 /// Rows of an activated image, [panels, rows, width + 2 padding, [`PANEL`]], zero in the padding and in channels that fill up the last panel.
-/// Row `y` takes the place of row `y - count`.
+/// Row `y` replaces row `y - count`.
 pub struct PanelRows {
-    /// A row of zeros, and then the panels.
+    /// A row of zeros, followed by the panels.
     values: Buffer,
     count: usize,
     height: usize,
@@ -15,7 +15,7 @@ pub struct PanelRows {
 }
 
 impl PanelRows {
-    /// Room for `count` rows of an image.
+    /// Allocates `count` rows of an image.
     pub fn new(
         pool: &Pool,
         count: usize,
@@ -44,12 +44,12 @@ impl PanelRows {
         (self.width + 2 * self.padding) * PANEL
     }
 
-    /// Values between a pixel in one panel and in the next one.
+    /// Returns the number of values from a pixel in one panel to the same pixel in the next one.
     pub fn panel(&self) -> usize {
         self.count * self.row()
     }
 
-    /// Where the pixels of a row begin in [`values_mut`](Self::values_mut), in the first panel and without padding.
+    /// Returns the index of the first pixel of a row in [`values_mut`](Self::values_mut), in the first panel and without padding.
     pub fn start(&self, y: usize) -> usize {
         self.row() * (1 + y % self.count) + self.padding * PANEL
     }
@@ -58,7 +58,7 @@ impl PanelRows {
         &mut self.values
     }
 
-    /// `K` rows from row `first` on, padded; zeros above and below the image.
+    /// Returns `K` padded rows from row `first` on; zeros above and below the image.
     pub fn under<const K: usize>(&self, first: isize) -> Under<'_, K> {
         let row = self.row();
         let place = |ky| match usize::try_from(first + ky as isize) {
@@ -77,13 +77,13 @@ impl PanelRows {
 #[derive(Clone, Copy)]
 pub struct Under<'a, const K: usize> {
     values: &'a [f32],
-    /// Where each row begins in the first panel, and how far it is to the next one.
+    /// Start of each row in the first panel, and the step to the next panel.
     places: [(usize, usize); K],
     row: usize,
 }
 
 impl<'a, const K: usize> Under<'a, K> {
-    /// The rows in one panel.
+    /// Returns the rows in one panel.
     pub fn panel(&self, panel: usize) -> [&'a [f32]; K] {
         (self.places).map(|(start, step)| &self.values[start + panel * step..][..self.row])
     }

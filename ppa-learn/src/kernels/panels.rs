@@ -1,4 +1,4 @@
-//! Weights of a pointwise convolution in the order of its kernel.
+//! Weights of a pointwise convolution in the order in which its kernel reads them.
 
 use pulp::{Simd, WithSimd};
 
@@ -6,12 +6,12 @@ use super::batch_norm::Affine;
 use super::buffer::{Buffer, Pool};
 use super::simd::{dispatch, lanes, lanes_mut};
 
-/// Channels that are laid out together; the widest vectors hold as many.
+/// Number of channels that are laid out together, equal to the lanes of the widest vectors.
 pub(super) const PANEL: usize = 16;
 
 /// Weights of a pointwise convolution with the normalisation after it folded in, in the order in which the kernel reads them.
 ///
-/// Channels come in groups that the kernel's registers hold, zeros after the last one; in each group [columns, width].
+/// Channels are in groups that fit the kernel's registers, with zeros after the last channel; each group is [columns, width].
 #[derive(Debug)]
 pub struct Panels {
     pub(super) values: Buffer,
@@ -20,9 +20,9 @@ pub struct Panels {
     columns: usize,
 }
 
-/// The first channel and the width of each group, of at most `widest` panels.
+/// Returns the first channel and the width of each group, of at most `widest` panels.
 ///
-/// None but a lonely panel is narrower than two where three would fit: one vector alone would wait for its sums.
+/// If three panels fit, a group has at least two, unless there is only one panel: a single vector would wait for its sums.
 pub(super) fn groups(channels: usize, widest: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {
@@ -38,13 +38,13 @@ pub(super) fn groups(channels: usize, widest: usize) -> impl Iterator<Item = (us
     })
 }
 
-/// Panels that a group has at most: as many as fill the registers with sums of a few pixels.
+/// Returns the maximum number of panels of a group: as many as fill the registers with sums of a few pixels.
 pub(super) fn widest<S: Simd>() -> usize {
     if S::F32_LANES == PANEL { 3 } else { 1 }
 }
 
 impl Panels {
-    /// Of weights [channels, columns] and the normalisation of their output.
+    /// Lays out weights [channels, columns] with the normalisation of their output.
     pub fn new(weight: &[f32], affine: &Affine, pool: &Pool) -> Self {
         let channels = affine.scale.len();
         let columns = weight.len() / channels;
@@ -66,17 +66,17 @@ impl Panels {
         }
     }
 
-    /// Output channels.
+    /// Returns the number of output channels.
     pub fn channels(&self) -> usize {
         self.channels
     }
 
-    /// Input channels.
+    /// Returns the number of input channels.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// These with each input channel times its gate.
+    /// Returns the weights with each input channel multiplied by its gate.
     pub fn gated(&self, gate: &[f32], pool: &Pool) -> Self {
         let mut values = pool.take(self.values.len());
         let to = &mut values;
@@ -124,10 +124,10 @@ impl WithSimd for LayOut<'_> {
     }
 }
 
-/// Writes rows of weights times their scale as columns of a group [columns, width] from column `start` on, zeros for rows that are empty.
+/// Writes rows of weights times their scale as columns of a group [columns, width] from column `start` on, with zeros for empty rows.
 fn turn(rows: [(&[f32], f32); PANEL], width: usize, start: usize, group: &mut [f32]) {
     for (number, group) in group.chunks_mut(PANEL * width).enumerate() {
-        // A block at a time, of known size.
+        // One block of known size at a time.
         let mut block = [[0.0; PANEL]; PANEL];
         for (to, (row, _)) in block.iter_mut().zip(&rows) {
             let row = row.get(number * PANEL..).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Pointwise convolution in inference: a product with weights that were laid out beforehand, activated before it leaves the registers.
+//! Pointwise convolution in inference: a product with prearranged weights, activated in registers.
 
 use pulp::{Simd, WithSimd};
 
@@ -6,7 +6,7 @@ use super::panel_rows::PanelRows;
 use super::panels::{PANEL, Panels, groups, widest};
 use super::simd::{dispatch, fma, lanes, silu, store};
 
-/// SiLU(convolution) of pixels [pixels, columns], few enough for the second-level cache: `out` [pixels, channels].
+/// Computes SiLU(convolution) of pixels [pixels, columns], few enough for the second-level cache: `out` [pixels, channels].
 pub fn activated(input: &[f32], panels: &Panels, out: &mut [f32]) {
     let channels = panels.channels();
     forward::<true>(input, panels, None, channels, pixel_by_pixel(channels), out);
@@ -34,7 +34,7 @@ pub fn activated_rows(
     forward::<true>(input, panels, None, stored, place, out.values_mut());
 }
 
-/// out = convolution of pixels [pixels, columns], plus what the block was given where it adds it.
+/// out = convolution of pixels [pixels, columns], plus the block's input if it is added.
 pub fn normalised(input: &[f32], panels: &Panels, added: Option<&[f32]>, out: &mut [f32]) {
     let channels = panels.channels();
     forward::<false>(
@@ -47,7 +47,7 @@ pub fn normalised(input: &[f32], panels: &Panels, added: Option<&[f32]>, out: &m
     );
 }
 
-/// Where a channel of a pixel is in [pixels, channels].
+/// Returns the index of a channel of a pixel in [pixels, channels].
 fn pixel_by_pixel(channels: usize) -> impl Fn(usize, usize) -> usize {
     move |pixel, channel| pixel * channels + channel
 }
@@ -77,9 +77,9 @@ struct Forward<'a, const ACTIVATE: bool, P> {
     input: &'a [f32],
     panels: &'a Panels,
     added: Option<&'a [f32]>,
-    /// Channels that are stored.
+    /// Number of channels to store.
     stored: usize,
-    /// Where a channel of a pixel goes; those of a vector are beside each other.
+    /// Output index of a channel of a pixel; the channels of a vector are next to each other.
     place: P,
     out: &'a mut [f32],
 }
@@ -89,9 +89,9 @@ impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> WithSimd for Forward<'_
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        // All pixels meet one group of channels, whose weights stay in the cache, after the other.
+        // One group of channels after the other for all pixels, so that its weights stay in the cache.
         for (first, width) in groups(self.panels.channels(), widest::<S>()) {
-            // As many sums as registers hold beside the weights.
+            // As many sums as fit into the registers next to the weights.
             match width / S::F32_LANES {
                 1 => self.group::<S, 8, 1>(simd, first),
                 2 if S::F32_LANES == PANEL => self.group::<S, 8, 2>(simd, first),
@@ -105,7 +105,7 @@ impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> WithSimd for Forward<'_
 }
 
 impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> Forward<'_, ACTIVATE, P> {
-    /// The channels of one group, from the first one on, of all pixels.
+    /// Computes the channels of one group, from `first` on, for all pixels.
     #[inline(always)]
     fn group<S: Simd, const M: usize, const V: usize>(&mut self, simd: S, first: usize) {
         let columns = self.panels.columns();
@@ -115,7 +115,7 @@ impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> Forward<'_, ACTIVATE, P
         let shift = lanes::<S>(&self.panels.shift[first..][..width]);
         let shift: [S::f32s; V] = std::array::from_fn(|v| shift[v]);
         for start in (0..pixels).step_by(M) {
-            // The last pixel is repeated for those beyond it.
+            // Pixels beyond the last one repeat it.
             let row = |m: usize| &self.input[(start + m).min(pixels - 1) * columns..][..columns];
             let sums = tile::<S, M, V>(simd, std::array::from_fn(row), weights, shift);
             for (m, sums) in sums.into_iter().enumerate() {
@@ -126,7 +126,7 @@ impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> Forward<'_, ACTIVATE, P
         }
     }
 
-    /// The channels of a pixel from `first` on.
+    /// Stores the channels of a pixel from `first` on.
     #[inline(always)]
     fn store<S: Simd, const V: usize>(
         &mut self,
@@ -153,7 +153,7 @@ impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> Forward<'_, ACTIVATE, P
     }
 }
 
-/// Sums over all columns of M pixels and V vectors of channels, from `shift` on.
+/// Sums over all columns for M pixels and V vectors of channels, starting from `shift`.
 #[inline(always)]
 fn tile<S: Simd, const M: usize, const V: usize>(
     simd: S,
@@ -198,7 +198,7 @@ mod tests {
     use crate::kernels::panels::LayOut;
     use proptest::prelude::*;
 
-    /// The convolution with other vectors than the widest.
+    /// Computes the convolution with vectors other than the widest.
     fn by<S: Simd>(simd: S, input: &[f32], weight: &[f32], affine: &Affine) -> Vec<f32> {
         let mut panels = Panels::new(weight, affine, &Pool::default());
         let (scale, values) = (&affine.scale[..], &mut panels.values[..]);

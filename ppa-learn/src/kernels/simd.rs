@@ -1,8 +1,8 @@
-//! Choice of vector instructions, and the sigmoid in them.
+//! Selection of vector instructions, and vectorised elementary functions.
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// Runs a kernel with the widest vectors that this machine has and that divide the number of channels.
+/// Runs a kernel with the widest vectors that this machine supports and that divide the number of channels.
 pub fn dispatch<K: WithSimd>(channels: usize, kernel: K) -> K::Output {
     match Arch::new() {
         #[cfg(target_arch = "x86_64")]
@@ -18,7 +18,7 @@ pub fn dispatch<K: WithSimd>(channels: usize, kernel: K) -> K::Output {
     }
 }
 
-/// The vectors of a slice, whose length is a multiple of theirs.
+/// Returns a slice as vectors; its length must be a multiple of theirs.
 #[inline(always)]
 pub fn lanes<S: Simd>(values: &[f32]) -> &[S::f32s] {
     let (vectors, rest) = S::as_simd_f32s(values);
@@ -26,7 +26,7 @@ pub fn lanes<S: Simd>(values: &[f32]) -> &[S::f32s] {
     vectors
 }
 
-/// As [`lanes`], to write.
+/// The mutable version of [`lanes`].
 #[inline(always)]
 pub fn lanes_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
     let (vectors, rest) = S::as_mut_simd_f32s(values);
@@ -34,7 +34,7 @@ pub fn lanes_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
     vectors
 }
 
-/// Writes a vector, or as much of its beginning as `to` has room for.
+/// Writes a vector, or as many of its first values as fit into `to`.
 #[inline(always)]
 pub fn store<S: Simd>(simd: S, vector: S::f32s, to: &mut [f32]) {
     if to.len() == S::F32_LANES {
@@ -44,7 +44,7 @@ pub fn store<S: Simd>(simd: S, vector: S::f32s, to: &mut [f32]) {
     }
 }
 
-/// a b + c, rounded once where the machine can. (The plain copy would call a function for each.)
+/// a b + c, rounded once if the machine supports it. (The scalar version would need a function call.)
 #[inline(always)]
 pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
     if S::IS_SCALAR {
@@ -57,7 +57,7 @@ pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
 /// 1 / (1 + exp(-y)) to 3e-7.
 ///
 /// exp(-y) = 2^n exp(-r) with |r| <= ln(2)/2, and exp(-r) by the polynomial of degree 5 with the least relative error, 7.5e-8.
-/// y is held within ±87, where exp is a normal number: beyond, the sigmoid is 0 or 1 to 2e-38.
+/// y is clamped to ±87, where exp is a normal number: beyond that, the sigmoid is 0 or 1 to 2e-38.
 #[inline(always)]
 pub fn sigmoid<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
     const LN2_HIGH: f32 = 0.693_359_4;
@@ -85,7 +85,7 @@ pub fn sigmoid<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
     minus_reciprocal(simd, fma(simd, minus_exp, power, splat(-1.0)))
 }
 
-/// -1 / x of normal negative numbers to 1.2e-7, without a division.
+/// Computes -1 / x of normal negative numbers to 1.2e-7, without a division.
 ///
 /// The difference of bit patterns is a first approximation, as in the fast inverse square root; a step of Newton's method whose constant
 /// is shifted with it leaves an error of 1.3e-3, and a step of third order 2e-9 before rounding.

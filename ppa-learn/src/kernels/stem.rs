@@ -4,10 +4,10 @@ use pulp::{Simd, WithSimd};
 
 use super::simd::{dispatch, fma, lanes, lanes_mut};
 
-/// Taps of the kernel.
+/// Number of taps of the kernel.
 pub const TAPS: usize = 9;
 
-/// The pixels under the kernel at output pixel (y, x) of an image; zeros outside it.
+/// Returns the pixels under the kernel at output pixel (y, x) of an image; zeros outside it.
 fn neighbours(image: &[f32], width: usize, y: usize, x: usize) -> [f32; TAPS] {
     std::array::from_fn(|tap| {
         let (y, x) = (
@@ -19,7 +19,7 @@ fn neighbours(image: &[f32], width: usize, y: usize, x: usize) -> [f32; TAPS] {
     })
 }
 
-/// The neighbours [width of the output, taps] of the pixels of output row `y`.
+/// Writes the neighbours [width of the output, taps] of the pixels of output row `y`.
 pub fn neighbours_of_row(image: &[f32], width: usize, y: usize, out: &mut [f32]) {
     // A zero before each row, and one or two after it.
     let mut padded = vec![0.0; width + 3];
@@ -38,7 +38,7 @@ pub fn neighbours_of_row(image: &[f32], width: usize, y: usize, out: &mut [f32])
     }
 }
 
-/// Output row `y` [width of the output, channels] from an image in rows of `width`; `weights` [3, 3, channels].
+/// Computes output row `y` [width of the output, channels] from an image in rows of `width`; `weights` are [3, 3, channels].
 pub fn forward_row(image: &[f32], width: usize, y: usize, weights: &[f32], out: &mut [f32]) {
     let channels = weights.len() / TAPS;
     dispatch(
@@ -89,7 +89,7 @@ impl WithSimd for ForwardRow<'_> {
     }
 }
 
-/// Adds to the gradient of the weights [3, 3, channels] what output row `y` gives.
+/// Adds the contribution of output row `y` to the gradient of the weights [3, 3, channels].
 pub fn add_weight_gradient(
     image: &[f32],
     width: usize,

@@ -1,4 +1,4 @@
-//! The blocks of EfficientNet-B0, and where each parameter lies in the flat variables.
+//! The blocks of EfficientNet-B0, and the position of each parameter in the flat variables.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use candle_core::Tensor;
 use super::{Named, NetworkError};
 use crate::kernels::depthwise::Window;
 
-/// Features that the last layer sees.
+/// Number of features, the inputs of the last layer.
 pub const FEATURES: usize = 1280;
 /// Channels of the first convolution.
 const STEM: usize = 32;
@@ -33,12 +33,12 @@ pub struct Entry {
     pub name: String,
     /// torchvision's shape.
     pub shape: Vec<usize>,
-    /// Where it lies.
+    /// Its range in the variable.
     pub range: Range<usize>,
 }
 
 impl Entry {
-    /// The part of a flat tensor, in its shape, on the way of gradients.
+    /// Returns this part of a flat tensor in its shape, with gradients.
     pub(super) fn view(&self, flat: &Tensor) -> candle_core::Result<Tensor> {
         flat.narrow(0, self.range.start, self.range.len())?
             .reshape(&self.shape[..])
@@ -56,7 +56,7 @@ impl Entry {
     }
 }
 
-/// Parameters and running statistics of a normalisation; all four ranges have the length of its channels.
+/// Parameters and running statistics of a normalisation; the length of all four ranges is its number of channels.
 #[derive(Debug, Clone)]
 pub struct NormPlace {
     pub weight: Range<usize>,
@@ -65,7 +65,7 @@ pub struct NormPlace {
     pub variance: Range<usize>,
 }
 
-/// What a convolution reads for each of its channels.
+/// Inputs of each output channel of a convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConvKind {
     /// The only channel of the images.
@@ -84,11 +84,11 @@ pub struct ConvPlace {
     pub weight: Range<usize>,
     pub norm: NormPlace,
     pub channels: usize,
-    /// Channels that it reads for each of its own.
+    /// Number of input channels of each output channel.
     pub inputs: usize,
 }
 
-/// A layer whose every output depends on every input.
+/// A fully connected layer.
 #[derive(Debug, Clone)]
 pub struct LinearPlace {
     pub weight: Range<usize>,
@@ -102,10 +102,10 @@ pub struct SqueezePlace {
     pub expand: LinearPlace,
 }
 
-/// One inverted residual block. The first one's expansion is the network's first convolution.
+/// One inverted residual block. The expansion of the first block is the network's first convolution.
 #[derive(Debug, Clone)]
 pub struct Block {
-    /// Counted from 0.
+    /// Number of the block, from 0.
     pub number: usize,
     pub expand: ConvPlace,
     pub depthwise: ConvPlace,
@@ -113,7 +113,7 @@ pub struct Block {
     pub project: ConvPlace,
     /// Whether the block adds its input to its output.
     pub residual: bool,
-    /// Probability that training leaves out the branch for an image.
+    /// Probability that training drops the branch for an image.
     pub drop: f32,
 }
 
@@ -127,7 +127,7 @@ pub struct Architecture {
     pub statistics: Vec<Entry>,
 }
 
-/// The entries so far, and where the next one begins.
+/// The entries so far, and the start of the next one.
 #[derive(Default)]
 struct Names {
     entries: Vec<Entry>,
@@ -199,12 +199,12 @@ impl Builder {
 }
 
 impl Architecture {
-    /// EfficientNet-B0, whose last block is left out with the probability `stochastic_depth`.
+    /// Returns EfficientNet-B0, whose last block is dropped with the probability `stochastic_depth`.
     pub fn new(outputs: usize, stochastic_depth: f32) -> Self {
         Self::of_stages(STEM, &STAGES, FEATURES, outputs, stochastic_depth)
     }
 
-    /// A network of the same kind. Its first stage expands nothing and changes the number of channels.
+    /// Returns a network of the same kind. Its first stage has no expansion and changes the number of channels.
     pub(super) fn of_stages(
         stem_channels: usize,
         stages: &[Stage],
@@ -226,7 +226,7 @@ impl Architecture {
                 let prefix = format!("features.{}.{repeat}.block", stage + 1);
                 let expanded = channels_in * expansion;
                 let stride = if repeat == 0 { stride } else { 1 };
-                // The only block that does not expand comes first, and takes the stem in its stead.
+                // The first block, the only one without expansion, takes the stem instead.
                 let (expand, next) = match stem.take() {
                     Some(stem) => (stem, 0),
                     None => {

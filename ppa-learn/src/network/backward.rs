@@ -1,4 +1,4 @@
-//! The backward pass: the gradient of every parameter from that of the features.
+//! The backward pass: the gradients of all parameters from that of the features.
 //!
 //! With a batch normalisation the gradient of a pixel needs sums over all pixels first. Each pass over the pixels therefore applies the sums of the
 //! previous one and accumulates those for the next.
@@ -13,7 +13,7 @@ use super::tape::Tape;
 use crate::kernels::buffer::Pool;
 use crate::kernels::gradient::Linear;
 
-/// What a backward pass reads, and the gradients that it writes, laid out as the parameters.
+/// Inputs of a backward pass, and the gradients that it writes, laid out as the parameters.
 pub struct Backward<'a> {
     pub architecture: &'a Architecture,
     pub parameters: &'a [f32],
@@ -22,7 +22,7 @@ pub struct Backward<'a> {
 }
 
 impl Backward<'_> {
-    /// Writes all gradients, from that of the features [images, 1280].
+    /// Computes all gradients from that of the features [images, 1280].
     pub fn run(mut self, tape: Tape, of_features: &[f32]) {
         let mut gradient = self.head(&tape.head_input.pixels, &tape.head, of_features);
         drop((tape.head_input, tape.head));
@@ -42,7 +42,7 @@ impl Backward<'_> {
     }
 }
 
-/// Two rows of sums times one factor for each channel.
+/// Multiplies two rows of sums by one factor for each channel.
 fn scaled(sums: &[f64], factors: &[f32]) -> Vec<f64> {
     sums.iter()
         .zip(factors.iter().cycle())
@@ -50,7 +50,7 @@ fn scaled(sums: &[f64], factors: &[f32]) -> Vec<f64> {
         .collect()
 }
 
-/// How the gradient of a depthwise convolution follows from that of its gated activation.
+/// Terms of the gradient of a depthwise convolution given that of its gated activation.
 struct Gated {
     linear: Linear,
     /// [images, channels]

@@ -1,15 +1,15 @@
-//! Why a network cannot be run.
+//! Errors of networks.
 
-/// Why a network cannot be run.
+/// Error in running a network.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NetworkError {
-    /// Images of another number of cameras than the network is for.
+    /// Images of a different number of cameras than the network takes.
     #[error("the network expects images of {}, found images of {found}", ppa_core::text::count(*expected, "camera"))]
     Cameras {
-        /// Cameras whose images were given.
+        /// Number of cameras whose images were given.
         found: usize,
-        /// Cameras that the network is for.
+        /// Number of cameras that the network takes.
         expected: usize,
     },
     /// Networks of two cameras of which only one predicts corrections.

@@ -6,7 +6,7 @@ use crate::kernels::buffer::Pool;
 use crate::kernels::filter::Taps;
 use crate::kernels::panels::Panels;
 
-/// Every convolution of a backbone, with the normalisation after it where that can be folded in.
+/// All convolutions of a backbone, with the normalisations after them folded in.
 #[derive(Debug)]
 pub struct Folded {
     pub blocks: Vec<FoldedBlock>,

@@ -1,4 +1,4 @@
-//! The forward pass of training, layer by layer on channels-last images.
+//! The forward pass in training, layer by layer on channels-last images.
 //!
 //! The output of a convolution is stored before its normalisation; whatever reads it normalises and activates it on the fly, a tile of pixels or a
 //! few rows at a time, so that activated images never go through memory.
@@ -18,17 +18,17 @@ use super::tape::{BlockTape, Images, Normed, Size, Tape, by_image};
 use crate::kernels::batch_norm::{Affine, activate, add_activated, normalise};
 use crate::kernels::buffer::Pool;
 
-/// Everything that a pass reads, the running statistics that it moves, and what it keeps.
+/// Inputs of a forward pass, the running statistics that it updates, and the values that it keeps.
 pub struct Forward<'a> {
     pub architecture: &'a Architecture,
     pub parameters: &'a [f32],
     pub statistics: &'a mut [f32],
     pub pool: &'a Pool,
-    /// How much of the batch enters the running statistics.
+    /// Weight of the batch in the update of the running statistics.
     pub momentum: f64,
-    /// Random numbers of stochastic depth; `None` keeps every branch.
+    /// Random numbers for stochastic depth; `None` keeps every branch.
     pub random: Option<&'a mut dyn rand::Rng>,
-    /// Of the blocks so far.
+    /// Tapes of the blocks so far.
     pub blocks: Vec<BlockTape>,
 }
 
@@ -39,16 +39,16 @@ pub struct Filtered {
 }
 
 impl Forward<'_> {
-    /// Features [images, 1280] of images [images, height, width], and what their gradient needs.
+    /// Computes the features [images, 1280] of images [images, height, width], and the tape for their gradient.
     pub fn run(mut self, images: &[f32], size: Size) -> (Vec<f32>, Tape) {
         let images = Images::copied(images, size, self.pool);
         let Ok(output) = self.features(self.architecture, images);
         output
     }
 
-    /// A convolution of images of a size, and its normalisation by the batch.
+    /// Computes a convolution of images of a size, and its normalisation by the batch.
     ///
-    /// `convolve` writes the output, of the size that it is given, and gives its moments.
+    /// `convolve` writes the output of the given size and returns its moments.
     fn normed(
         &mut self,
         place: &ConvPlace,
@@ -149,7 +149,7 @@ impl Layers for Forward<'_> {
     }
 }
 
-/// Activated pixels of a run times the gates of their image.
+/// Writes the activated pixels of a run times the gates of their image.
 pub fn gated(
     pixels: &[f32],
     affine: &Affine,
@@ -167,7 +167,7 @@ pub fn gated(
     }
 }
 
-/// The sum of the tasks' sums, in the order of the tasks.
+/// Adds up the tasks' sums, in the order of the tasks.
 pub fn total<T: std::ops::AddAssign + Send>(
     parts: impl IndexedParallelIterator<Item = Vec<T>>,
 ) -> Vec<T> {
@@ -182,7 +182,7 @@ pub fn total<T: std::ops::AddAssign + Send>(
     sum
 }
 
-/// Mean of each activated channel over each image: [images, channels].
+/// Returns the mean of each activated channel over each image: [images, channels].
 fn pooled(input: &Normed) -> Vec<f32> {
     let size = input.size;
     let channels = input.norm.mean.len();

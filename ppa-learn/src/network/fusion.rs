@@ -1,4 +1,4 @@
-//! Fusion of the images of both cameras into one prediction, which the authors' repository offers besides separate networks
+//! Fusion of the images of both cameras into one prediction, which the authors' repository offers in addition to separate networks
 //! (github.com/INB-KI-SIGS/patient-pose-assessment, commit 3bbf3e9).
 
 use candle_core::{Device, Tensor, Var};
@@ -11,32 +11,32 @@ use super::initialise::gains;
 use super::{NetworkError, on_device, variable};
 use crate::random::{Purpose, stream};
 
-/// Values that each camera's network gives to late fusion.
+/// Number of outputs of each camera's network in late fusion.
 pub const LATE_OUTPUTS: usize = 512;
-/// Values of the layer between.
+/// Number of values of the hidden layer.
 const HIDDEN: usize = 256;
 
-/// Where the images of both cameras are joined.
+/// Stage at which both cameras are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FusionKind {
-    /// Each camera's network gives a quality; the answer is their mean.
+    /// Each camera's network predicts a quality; the result is their mean.
     Score,
-    /// Each camera's network gives 512 values, and two more layers make the answer of all of them.
+    /// Each camera's network gives 512 values, from which two more layers compute the prediction.
     Late,
 }
 
-/// A network of both cameras' images of one moment.
+/// Fusion of both cameras' images of one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fusion {
-    /// Where both are joined.
+    /// Stage at which both cameras are joined.
     pub kind: FusionKind,
     /// One network for both cameras instead of one for each; training normalises by the images of both.
     pub shared_weights: bool,
-    /// Probability that a step leaves out a camera; never both.
+    /// Probability that a step drops a camera; never both.
     pub branch_dropout: f32,
-    /// Probability that late fusion leaves out a value before its last layer.
+    /// Probability that late fusion drops a value before its last layer.
     pub late_dropout: f32,
 }
 
@@ -52,7 +52,7 @@ impl Default for Fusion {
     }
 }
 
-/// The factors of both cameras at a step of training: 0 for the one that is left out, so that the mean factor is 1.
+/// Returns the factors of both cameras in a training step: 0 for a dropped camera, such that the mean factor is 1.
 pub fn branch_gains(random: &mut impl Rng, drop: f32) -> [f64; 2] {
     let mut kept = [(); 2].map(|()| drop <= random.random::<f32>());
     if kept == [false; 2] {
@@ -64,7 +64,7 @@ pub fn branch_gains(random: &mut impl Rng, drop: f32) -> [f64; 2] {
     }
 }
 
-/// The layers after those of both cameras: SiLU, 1024 to 256 values, SiLU, dropout, 256 to the network's outputs.
+/// The layers after both cameras' networks: SiLU, 1024 to 256 values, SiLU, dropout, 256 to the network's outputs.
 #[derive(Debug, Clone)]
 pub struct LateFusion {
     variable: Var,
@@ -73,7 +73,7 @@ pub struct LateFusion {
 }
 
 impl LateFusion {
-    /// Layers with torch's first values: uniform in ±1 / sqrt(values in), weights and biases.
+    /// Makes layers with torch's initial values: weights and biases uniform in ±1 / sqrt(number of inputs).
     pub fn new(seed: u64, dropout: f32, outputs: usize) -> Result<Self, NetworkError> {
         let layers = [
             ("fc.0", HIDDEN, 2 * LATE_OUTPUTS),
@@ -102,7 +102,7 @@ impl LateFusion {
         })
     }
 
-    /// A copy on another device.
+    /// Returns a copy on another device.
     pub fn to_device(&self, device: &Device) -> Result<Self, NetworkError> {
         Ok(Self {
             variable: on_device(&self.variable, device)?,
@@ -115,7 +115,7 @@ impl LateFusion {
         &self.variable
     }
 
-    /// Where the last layer begins in the variable.
+    /// Returns the start of the last layer in the variable.
     pub fn last_layer(&self) -> usize {
         self.entries[2].range.start
     }
@@ -124,8 +124,8 @@ impl LateFusion {
         &self.entries
     }
 
-    /// The network's outputs for each moment [moments, outputs], from the values [moments, 1024] of both cameras; `random` draws the
-    /// dropout mask in training.
+    /// Computes the network's outputs for each moment [moments, outputs], from the values [moments, 1024] of both cameras; `random` draws
+    /// the dropout mask in training.
     pub fn forward(
         &self,
         joined: &Tensor,
@@ -163,7 +163,7 @@ mod tests {
         let draws: Vec<_> = (0..4000)
             .map(|step| branch_gains(&mut stream(1, Purpose::FusionDropout, step), 0.2))
             .collect();
-        // Both are kept with 0.8², else one of them.
+        // Both are kept with probability 0.8², otherwise one of them.
         let z = |gains: [f64; 2], p: f64| {
             let found = draws.iter().filter(|&&draw| draw == gains).count() as f64;
             let n = draws.len() as f64;

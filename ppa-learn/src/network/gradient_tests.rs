@@ -16,7 +16,7 @@ use crate::kernels::buffer::Pool;
 
 const DROP: f32 = 0.4;
 
-/// A stem and a stage without expansion, then two stages of one or two blocks; channels that need all widths of vectors.
+/// A stem and a stage without expansion, then two stages of one or two blocks, with channels that need all widths of vectors.
 fn shapes() -> impl Strategy<Value = (usize, [Stage; 3], Size)> {
     let channels = || prop::sample::select(vec![3_usize, 4, 8, 16]);
     let stage = move || {
@@ -97,7 +97,7 @@ proptest! {
             let expected = (moved(1e-5) - moved(-1e-5)) / 2e-5;
             let gradient = &gradients[entry.range.clone()];
             // The product with a normal direction has the size of the gradient. Gradients that are zero in theory are sums
-            // that cancel in f32, whose error goes with the gradient of the whole.
+            // that cancel in f32, with an error proportional to the total gradient.
             let allowed = 1e-3 * dot(gradient, gradient).sqrt() + 1e-5 * dot(&gradients, &gradients).sqrt();
             let error = (dot(gradient, &direction) - expected).abs();
             prop_assert!(error < allowed, "{}: {} expected {expected}", entry.name, dot(gradient, &direction));

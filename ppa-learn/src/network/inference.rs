@@ -1,8 +1,8 @@
-//! Inference: what each normalisation does is known beforehand, so that a convolution's output is normalised, activated and pooled
-//! while it is in registers or the cache. An expanded image never exists as a whole: its rows are computed as the depthwise convolution
+//! Inference: the normalisations are known beforehand, so a convolution's output is normalised, activated and pooled while it is in
+//! registers or the cache. An expanded image is never stored completely: its rows are computed when the depthwise convolution
 //! needs them.
 //!
-//! The result for a row or pixel does not depend on how they are divided among threads, and sums of rows are added in their order.
+//! The result for a row or pixel does not depend on the division among threads, and sums of rows are added in their order.
 
 use std::convert::Infallible;
 use std::ops::Range;
@@ -20,7 +20,7 @@ use crate::kernels::panel_rows::PanelRows;
 use crate::kernels::pointwise::{activated, activated_rows, normalised};
 use crate::kernels::stem;
 
-/// Everything that a pass reads.
+/// Inputs of a pass.
 #[derive(Clone, Copy)]
 pub struct Inference<'a> {
     pub architecture: &'a Architecture,
@@ -35,7 +35,7 @@ pub struct Filtered {
     pooled: Vec<f32>,
 }
 
-/// What `work` gives of each part, in their order. A single thread works by itself: to wake another one costs more than a part.
+/// Returns the results of `work` for each part, in order. Without other threads it runs in place: waking one costs more than a part.
 fn of_each<T: Send, R: Send>(parts: Vec<T>, work: impl Fn(usize, T) -> R + Sync) -> Vec<R> {
     if rayon::current_num_threads() == 1 {
         let parts = parts.into_iter().enumerate();
@@ -47,7 +47,7 @@ fn of_each<T: Send, R: Send>(parts: Vec<T>, work: impl Fn(usize, T) -> R + Sync)
 }
 
 impl Inference<'_> {
-    /// Features [images, 1280] of images [images, height, width].
+    /// Computes the features [images, 1280] of images [images, height, width].
     pub fn run(&self, images: &[f32], size: Size) -> Vec<f32> {
         let size = Size { images: 1, ..size };
         let images = images.chunks(size.pixels()).collect();
@@ -59,7 +59,7 @@ impl Inference<'_> {
         of_each(images, of_image).concat()
     }
 
-    /// The stem or the expansion of a block: some rows of its output.
+    /// Computes some output rows of the stem or of the expansion of a block.
     fn expand(&self, block: &Block, input: &Images, rows: Range<usize>, out: &mut PanelRows) {
         let panels = &self.folded.blocks[block.number].expand;
         let width = block.expand.window.output(input.size.width);
@@ -76,7 +76,7 @@ impl Inference<'_> {
         }
     }
 
-    /// Rows of a block's depthwise convolution from `first` on: [rows, width, channels], and their sums [rows, channels].
+    /// Computes rows of a block's depthwise convolution from `first` on, [rows, width, channels], and their sums [rows, channels].
     fn filter_part(
         &self,
         block: &Block,
@@ -90,7 +90,7 @@ impl Inference<'_> {
         let expanded = input.size.after(block.expand.window);
         let count = sums.len() / channels;
         let row = out.len() / count;
-        // The expanded row under the top of the kernel, and the one after its bottom.
+        // The expanded row at the top of the kernel, and the one after its bottom.
         let top = |y: usize| ((first + y) * window.stride) as isize - window.padding() as isize;
         let end = |y: usize| (top(y) + window.kernel as isize).cast_unsigned();
         let last = end(count - 1).min(expanded.height);
@@ -130,7 +130,7 @@ impl Layers for Inference<'_> {
         let row = size.width * channels;
         let mut pixels = self.pool.take(size.height * row);
         let mut sums = self.pool.take(size.height * channels);
-        // Rows that two parts need are expanded twice: a fifth of the rows at most.
+        // Rows needed by two parts are expanded twice: at most a fifth of the rows.
         let least = 4 * window.kernel;
         let task = (size.height.div_ceil(rayon::current_num_threads())).max(least);
         let parts = pixels.chunks_mut(task * row);
@@ -149,7 +149,7 @@ impl Layers for Inference<'_> {
         Ok(Squeeze::forward(&block.squeeze, self.parameters, pooled).gate)
     }
 
-    /// The gates are multiplied into the weights, or into the pixels where these have fewer values.
+    /// Multiplies the gates into the weights, or into the pixels if these have fewer values.
     fn project(
         &mut self,
         block: &Block,
@@ -195,7 +195,7 @@ impl Layers for Inference<'_> {
     }
 }
 
-/// The mean of each channel of some pixels, from sums [sums, channels] over one or more of them each.
+/// Returns the mean of each channel over `pixels` pixels, from partial sums [sums, channels].
 fn means(sums: &[f32], channels: usize, pixels: usize) -> Vec<f32> {
     let mut total = vec![0.0; channels];
     for sums in sums.chunks_exact(channels) {

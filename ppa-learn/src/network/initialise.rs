@@ -6,7 +6,7 @@ use rand_distr::{Distribution, Normal, Uniform};
 use super::architecture::{Architecture, Entry};
 use crate::random::{Purpose, stream};
 
-/// Values of the backbone and of the classifier; each parameter has a stream of its own.
+/// Returns initial values of the backbone and of the classifier; each parameter has its own random stream.
 pub fn parameters(architecture: &Architecture, seed: u64) -> (Vec<f32>, Vec<f32>) {
     let mut index = 0;
     let mut fill = |entries: &[Entry]| {
@@ -40,7 +40,7 @@ fn sampler<'a>(entry: &Entry, random: &'a mut impl Rng) -> Box<dyn FnMut(usize) 
     }
 }
 
-/// Running means 0 and variances 1.
+/// Returns running means of 0 and variances of 1.
 pub fn statistics(architecture: &Architecture) -> Vec<f32> {
     let entries = architecture.statistics.iter();
     entries
@@ -55,7 +55,7 @@ pub fn statistics(architecture: &Architecture) -> Vec<f32> {
         .collect()
 }
 
-/// 0 with the probability `drop`, else 1 / (1 - drop), so that the mean is 1.
+/// Draws 0 with probability `drop`, otherwise 1 / (1 - drop), so that the mean is 1.
 pub fn gains(random: &mut impl Rng, count: usize, drop: f32) -> Vec<f32> {
     let kept = 1.0 / (1.0 - drop);
     (0..count)

@@ -1,10 +1,10 @@
-//! The order of the layers, which training, inference, devices and ONNX models share.
+//! The order of the layers, shared by training, inference, devices and ONNX models.
 
 use super::architecture::{Architecture, Block, ConvPlace};
 
-/// The layers of one form of the network, several of them fused where that form can do so.
+/// The layers of one implementation of the network, several of them fused if possible.
 ///
-/// A layer owns what no later one needs: training keeps it for the gradient, inference gives its memory back.
+/// A layer takes ownership of values that no later one needs: training keeps them for the gradient, inference frees their memory.
 pub trait Layers {
     /// Images, or the output of a block.
     type Image;
@@ -41,14 +41,14 @@ pub trait Layers {
         input: Self::Image,
     ) -> Result<Self::Features, Self::Error>;
 
-    /// The output of a block.
+    /// Computes the output of a block.
     fn block(&mut self, block: &Block, input: Self::Image) -> Result<Self::Image, Self::Error> {
         let filtered = self.filter(block, &input)?;
         let gate = self.squeeze(block, &filtered)?;
         self.project(block, filtered, gate, input)
     }
 
-    /// The features of images.
+    /// Computes the features of images.
     fn features(
         &mut self,
         architecture: &Architecture,

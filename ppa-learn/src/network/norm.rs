@@ -6,7 +6,7 @@ use crate::kernels::gradient::Linear;
 
 /// torch's default, added to a variance.
 pub const EPSILON: f64 = 1e-5;
-/// torch's default: how much of a training batch enters the running statistics.
+/// torch's default: weight of a training batch in the update of the running statistics.
 pub const MOMENTUM: f64 = 0.1;
 
 /// A normalisation as it was applied.
@@ -18,7 +18,7 @@ pub struct Norm {
     inverse: Vec<f64>,
 }
 
-/// What a normalisation amounts to in evaluation.
+/// Returns a normalisation in evaluation as an affine map.
 pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Affine {
     let moment = |range: &std::ops::Range<usize>| -> Vec<f64> {
         let values = statistics[range.clone()].iter();
@@ -29,8 +29,8 @@ pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Aff
 }
 
 impl Norm {
-    /// By a batch, of which `sums` holds sum (x - center) and sum (x - center)^2 over `count` values of each channel,
-    /// center being the running mean. Moves the running statistics by `momentum`, the variance by its unbiased estimate.
+    /// Normalises by a batch, for which `sums` holds sum (x - center) and sum (x - center)^2 over `count` values of each channel,
+    /// with the running mean as center. Updates the running statistics with `momentum`, using the unbiased variance.
     pub fn batch(
         place: &NormPlace,
         parameters: &[f32],
@@ -90,7 +90,7 @@ impl Norm {
         }
     }
 
-    /// Writes the gradients of weight and bias, from sum g and sum g (x - mean) of each channel, and gives that of x.
+    /// Writes the gradients of weight and bias, from sum g and sum g (x - mean) of each channel, and returns that of x.
     pub fn backward(
         &self,
         place: &NormPlace,

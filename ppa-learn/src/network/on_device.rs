@@ -28,7 +28,7 @@ use backward::Backward;
 use forward::{Forward, Tape};
 use parameters::Parameters;
 
-/// The features [images, 1280] of images [images, 1, height, width]; after a pass that normalises by the batch, with a gradient.
+/// Computes the features [images, 1280] of images [images, 1, height, width]; with a gradient if the pass normalises by the batch.
 pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
     let (count, _, height, width) = images.dims4()?;
     let input = images.detach().reshape((count, height, width, 1))?;
@@ -37,7 +37,7 @@ pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result
     let statistics = network.statistics.as_detached_tensor();
     let evaluates = mode == Mode::Eval;
 
-    // Drawn block by block as our kernels draw them.
+    // Drawn block by block, as on the CPU.
     let step = mode.dropout_step();
     let mut random = step.map(|step| stream(network.seed, Purpose::Dropout, 2 * step));
     let mut draw = |block: &Block| match &mut random {
@@ -71,7 +71,7 @@ pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result
     images.apply_op2(&network.backbone, pass)
 }
 
-/// A pass that was made, as one operation from (images, parameters) to features.
+/// A completed pass, as one operation from (images, parameters) to features.
 struct Pass {
     architecture: Arc<Architecture>,
     features: Tensor,

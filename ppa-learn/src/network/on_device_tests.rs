@@ -1,4 +1,4 @@
-//! The network as devices compute it, by emulated kernels, compared with our CPU kernels and with PyTorch.
+//! The network on devices, computed by emulated kernels and compared with our CPU kernels and with PyTorch.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 
-/// What a pass of training gives.
+/// Results of a training pass.
 struct Trained {
     output: Vec<f64>,
     gradients: Vec<(String, Vec<f64>)>,
@@ -114,16 +114,16 @@ fn device_and_cpu_agree_in_outputs_and_gradients() {
     let whole = length(&all.collect::<Vec<f64>>());
     let pairs = on_device.gradients.iter().zip(&on_cpu.gradients);
     let errors = pairs.map(|((name, device), (_, cpu))| {
-        // Sums that cancel in f32, such as those of biases before another normalisation, err by the gradient of the whole.
+        // Sums that cancel in f32, such as those of biases before another normalisation, have errors proportional to the total gradient.
         let allowed = length(cpu) + 1e-2 * whole;
         (length(&difference(device, cpu)) / allowed, name)
     });
     let (worst, name) = errors.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
     println!("gradients {worst:.1e} at {name}");
-    // Normalisation by the 24 values of a channel in the last blocks enlarges what f32 rounds.
+    // Normalisation by the 24 values of a channel in the last blocks amplifies rounding errors of f32.
     assert!(worst < 1e-3, "gradient of {name}: {worst:.1e}");
 
-    // By the running statistics, which training moved from 0 and 1.
+    // With the running statistics, which training changed from 0 and 1.
     let [device, cpu] =
         [device_features as Features, cpu_features].map(|f| evaluated(&twin, &input, f));
     let error = length(&difference(&device, &cpu));

@@ -1,4 +1,4 @@
-//! The backbone as one operation of candle, so that losses on its features have gradients by `backward()`.
+//! The backbone as one candle operation, so that `backward()` gives gradients of losses on its features.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -39,7 +39,7 @@ impl Backbone {
     }
 }
 
-/// The values of a contiguous tensor.
+/// Returns the values of a contiguous tensor.
 fn values<'a>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [f32]> {
     let (start, end) = layout.contiguous_offsets().ok_or_else(|| {
         Error::RequiresContiguous {
@@ -107,7 +107,7 @@ impl CustomOp2 for Backbone {
         Ok((CpuStorage::F32(features), (count, FEATURES).into()))
     }
 
-    /// The gradient of the parameters. Images have none: nothing before them is trained.
+    /// Computes the gradient of the parameters. Images have none because nothing before them is trained.
     fn bwd(
         &self,
         _: &Tensor,

@@ -1,4 +1,4 @@
-//! The network of a training: of one camera's images, or of both cameras' images of one moment.
+//! The network that is trained: for one camera's images, or for both cameras' images of one moment.
 
 use candle_core::{Device, Tensor, Var};
 use rand::Rng;
@@ -8,10 +8,10 @@ use super::fusion::{Fusion, FusionKind, LATE_OUTPUTS, LateFusion, branch_gains};
 use super::{EfficientNetB0, Mode, Named, NetworkError, Options};
 use crate::random::{Purpose, stream};
 
-/// A network that predicts the quality of a pose, and the correction if asked for, from the images of one camera or of both.
+/// A network that predicts the quality of a pose, and optionally the correction, from the images of one camera or of both.
 ///
-/// Its tensors bear the names of the authors' modules: torchvision's for one camera; `module.` before them where both cameras share
-/// the weights, else `cam_left_module.` and `cam_right_module.`; `fc.0` and `fc.3` for the layers of late fusion.
+/// Its tensors have the names of the authors' modules: torchvision's for one camera; prefixed by `module.` if both cameras share
+/// the weights, otherwise by `cam_left_module.` and `cam_right_module.`; `fc.0` and `fc.3` for the layers of late fusion.
 #[derive(Debug, Clone)]
 pub struct QualityNetwork {
     /// One network, or the left and the right camera's.
@@ -22,10 +22,10 @@ pub struct QualityNetwork {
     seed: u64,
 }
 
-/// Degrees of one unit of a network's second output: corrections are then of the size of labels.
+/// Degrees per unit of a network's second output, which gives corrections the magnitude of labels.
 pub const CORRECTION_UNIT_DEG: f64 = 30.0;
 
-/// What a network predicts.
+/// Targets that a network predicts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Targets {
     /// The quality of a pose: the paper's network.
@@ -36,7 +36,7 @@ pub enum Targets {
 }
 
 impl Targets {
-    /// Values for each moment.
+    /// Returns the number of outputs for each moment.
     pub(crate) fn outputs(self) -> usize {
         match self {
             Self::Quality => 1,
@@ -45,17 +45,17 @@ impl Targets {
     }
 }
 
-/// What a network predicts of a pose.
+/// Prediction of a network for a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosePrediction {
     /// Quality from 1 (ideal) to 3 (inadequate).
     pub quality: f64,
-    /// Medial rotation in degrees that would bring the limb into its best pose; laterally where negative.
+    /// Medial rotation in degrees that would bring the limb into its best pose; lateral if negative.
     pub correction_deg: Option<f64>,
 }
 
 impl PosePrediction {
-    /// A quality without a correction.
+    /// Makes a prediction of the quality without a correction.
     pub fn of_quality(quality: f64) -> Self {
         Self {
             quality,
@@ -63,7 +63,7 @@ impl PosePrediction {
         }
     }
 
-    /// The predictions of a network's outputs [moments, 1 or 2].
+    /// Converts a network's outputs [moments, 1 or 2] to predictions.
     pub(crate) fn of(outputs: &Tensor) -> Result<Vec<Self>, NetworkError> {
         let rows = outputs.to_vec2::<f32>()?;
         let prediction = |row: &Vec<f32>| Self {
@@ -76,20 +76,20 @@ impl PosePrediction {
     }
 }
 
-/// What stands before the names of each camera's network.
+/// Prefixes of the tensor names of each camera's network.
 pub(crate) const CAMERA_PREFIXES: [&str; 2] = ["cam_left_module.", "cam_right_module."];
 
-/// A parameter or a running statistic: its name, and where it lies.
+/// Name and position of a parameter or a running statistic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// Which of the flat variables.
+    /// Index of the flat variable.
     pub variable: usize,
-    /// Name, shape and place in it.
+    /// Name, shape and range in the variable.
     pub entry: Entry,
 }
 
 impl QualityNetwork {
-    /// A network of `targets` with first values as [`EfficientNetB0::new`]; of both cameras if it fuses them.
+    /// Makes a network for `targets` with initial values as in [`EfficientNetB0::new`]; for both cameras if `fusion` is given.
     ///
     /// # Errors
     /// If candle cannot make the variables.
@@ -128,7 +128,7 @@ impl QualityNetwork {
         })
     }
 
-    /// The networks of the left and the right camera as one, whose answer is the mean of theirs: the paper's answer for a pose. It
+    /// Combines the networks of the left and the right camera into one that predicts the mean of both, as the paper does for a pose. It
     /// shares its variables with them.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ impl QualityNetwork {
         })
     }
 
-    /// Makes the answer to everything `quality`, and a correction of 0, by last layers whose weights are 0.
+    /// Sets the weights of the last layers to 0, such that every prediction is `quality` with a correction of 0.
     ///
     /// # Errors
     /// If candle cannot set the variables.
@@ -170,7 +170,7 @@ impl QualityNetwork {
         for (variable, start) in last {
             let mut values = variable.to_vec1::<f32>()?;
             values[start..].fill(0.0);
-            // The biases stand behind the weights, that of the quality first.
+            // The biases follow the weights, that of the quality first.
             let biases = values.len() - self.targets.outputs();
             values[biases] = quality;
             variable.set(&Tensor::new(values, variable.device())?)?;
@@ -178,12 +178,12 @@ impl QualityNetwork {
         Ok(())
     }
 
-    /// Where it computes, and where its images have to be.
+    /// Returns the device on which the network computes and its images must be.
     pub fn device(&self) -> &Device {
         self.branches[0].device()
     }
 
-    /// A copy on another device, as [`EfficientNetB0::to_device`].
+    /// Returns a copy on another device, as [`EfficientNetB0::to_device`].
     ///
     /// # Errors
     /// If candle cannot copy.
@@ -197,28 +197,29 @@ impl QualityNetwork {
         })
     }
 
-    /// What it predicts.
+    /// Returns the targets that the network predicts.
     pub fn targets(&self) -> Targets {
         self.targets
     }
 
-    /// Cameras whose images it takes.
+    /// Returns the number of cameras whose images the network takes.
     pub fn cameras(&self) -> usize {
         if self.fusion.is_some() { 2 } else { 1 }
     }
 
-    /// Quality and, if it is a target, correction as a share of [`CORRECTION_UNIT_DEG`] for each moment [moments, 1 or 2], from each camera's images [moments, 1, height, width], left first.
+    /// Computes quality and, if it is a target, correction in units of [`CORRECTION_UNIT_DEG`] for each moment [moments, 1 or 2], from
+    /// each camera's images [moments, 1, height, width], left first.
     ///
     /// # Errors
-    /// As [`EfficientNetB0::forward`], and for another number of cameras.
+    /// The same as [`EfficientNetB0::forward`], and for a wrong number of cameras.
     pub fn forward(&self, images: &[Tensor], mode: Mode) -> Result<Tensor, NetworkError> {
         self.classify(&self.features(images, mode)?, mode)
     }
 
-    /// The features [moments, 1280] of each camera's images.
+    /// Computes the features [moments, 1280] of each camera's images.
     ///
     /// # Errors
-    /// As [`QualityNetwork::forward`].
+    /// The same as [`QualityNetwork::forward`].
     pub fn features(&self, images: &[Tensor], mode: Mode) -> Result<Vec<Tensor>, NetworkError> {
         match (images, &self.branches[..]) {
             ([left, right], [of_left, of_right]) => {
@@ -232,10 +233,10 @@ impl QualityNetwork {
         }
     }
 
-    /// The layers after the features of each camera.
+    /// Applies the layers after the features of each camera.
     ///
     /// # Errors
-    /// If the features have another shape, or are of another number of cameras.
+    /// If the features have a wrong shape or a wrong number of cameras.
     pub fn classify(&self, features: &[Tensor], mode: Mode) -> Result<Tensor, NetworkError> {
         let outputs = match (features, &self.branches[..]) {
             ([left, right], [of_left, of_right]) => {
@@ -264,7 +265,7 @@ impl QualityNetwork {
         }
     }
 
-    /// What the one network gives for each camera, all in one pass.
+    /// Returns the results of the shared network for each camera, computed in one pass.
     fn of_all(
         &self,
         inputs: &[Tensor],
@@ -284,7 +285,7 @@ impl QualityNetwork {
         Ok(vec![run(&self.branches[0], one)?])
     }
 
-    /// The networks that it is made of: one, or the left and the right camera's.
+    /// Returns the networks of the cameras: one, or the left and the right camera's.
     pub(crate) fn branches(&self) -> &[EfficientNetB0] {
         &self.branches
     }
@@ -297,7 +298,7 @@ impl QualityNetwork {
         self.late.as_ref()
     }
 
-    /// What stands before the names of each of the networks.
+    /// Returns the prefixes of the tensor names of each of the networks.
     pub(crate) fn prefixes(&self) -> &'static [&'static str] {
         match self.fusion {
             None => &[""],
@@ -306,7 +307,7 @@ impl QualityNetwork {
         }
     }
 
-    /// The flat variables that training changes.
+    /// Returns the flat variables that training changes.
     pub fn variables(&self) -> Vec<&Var> {
         let branches = self.branches.iter().flat_map(EfficientNetB0::variables);
         branches
@@ -314,7 +315,7 @@ impl QualityNetwork {
             .collect()
     }
 
-    /// Where in [`QualityNetwork::variables`] each parameter lies.
+    /// Returns the position of each parameter in [`QualityNetwork::variables`].
     pub fn layout(&self) -> Vec<Place> {
         let mut places = Vec::new();
         for (number, (branch, prefix)) in self.branches.iter().zip(self.prefixes()).enumerate() {
@@ -331,13 +332,13 @@ impl QualityNetwork {
         places
     }
 
-    /// The flat variables of running statistics, one of each network.
+    /// Returns the flat variables of running statistics, one for each network.
     pub fn statistics_variables(&self) -> Vec<&Var> {
         let branches = self.branches.iter();
         branches.map(EfficientNetB0::statistics_variable).collect()
     }
 
-    /// Where in [`QualityNetwork::statistics_variables`] each running mean and variance lies.
+    /// Returns the position of each running mean and variance in [`QualityNetwork::statistics_variables`].
     pub fn statistics_layout(&self) -> Vec<Place> {
         let mut places = Vec::new();
         for (number, (branch, prefix)) in self.branches.iter().zip(self.prefixes()).enumerate() {
@@ -349,7 +350,7 @@ impl QualityNetwork {
         places
     }
 
-    /// Every parameter, then every running statistic, by name.
+    /// Returns every parameter, then every running statistic, by name.
     ///
     /// # Errors
     /// If candle cannot copy.

@@ -1,4 +1,4 @@
-//! The same network in plain f64, image by image and pixel by pixel, channels first, as the equations are written.
+//! Reference implementation of the network in plain f64, image by image and pixel by pixel, channels first, following the equations.
 
 use super::architecture::{Architecture, Block, ConvPlace};
 
@@ -178,7 +178,7 @@ fn block(block: &Block, first: bool, input: Maps, parameters: &[f64], gains: &[f
     maps
 }
 
-/// Features [images * features] in training, with the gains of stochastic depth of each residual block in turn.
+/// Computes features [images * features] in training, with the gains of stochastic depth of each residual block in order.
 pub fn features(
     architecture: &Architecture,
     parameters: &[f64],

@@ -3,7 +3,7 @@
 use super::architecture::{LinearPlace, SqueezePlace};
 use crate::kernels::matrix::{Matrix, Store, multiply};
 
-/// What the gradient needs of a forward pass; all [images, channels] or [images, squeezed].
+/// Values of a forward pass that the gradient needs; all [images, channels] or [images, squeezed].
 #[derive(Debug)]
 pub struct Squeeze {
     pub pooled: Vec<f32>,
@@ -32,7 +32,7 @@ fn linear(rows: &[f32], place: &LinearPlace, parameters: &[f32]) -> Vec<f32> {
 }
 
 impl Squeeze {
-    /// The gates, from the means of the activated channels [images, channels].
+    /// Computes the gates from the means of the activated channels [images, channels].
     pub fn forward(place: &SqueezePlace, parameters: &[f32], pooled: Vec<f32>) -> Self {
         let hidden = linear(&pooled, &place.squeeze, parameters);
         let active: Vec<f32> = hidden.iter().map(|&x| x * sigmoid(x)).collect();
@@ -45,7 +45,7 @@ impl Squeeze {
         }
     }
 
-    /// The gradient of the means, from that of the gates; writes those of the parameters.
+    /// Returns the gradient of the means, given that of the gates, and writes those of the parameters.
     pub fn backward(
         &self,
         place: &SqueezePlace,
@@ -88,7 +88,7 @@ impl Squeeze {
     }
 }
 
-/// Writes the gradients of weight [out, in] and bias of a layer, from those of its output [images, out].
+/// Writes the gradients of weight [out, in] and bias of a layer, given those of its output [images, out].
 fn layer_gradients(of_out: &[f32], input: &[f32], place: &LinearPlace, gradients: &mut [f32]) {
     let LinearPlace { weight, bias } = place;
     let (out, columns) = (bias.len(), weight.len() / bias.len());

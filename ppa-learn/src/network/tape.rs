@@ -7,7 +7,7 @@ use super::squeeze::Squeeze;
 use crate::kernels::buffer::{Buffer, Pool};
 use crate::kernels::depthwise::Window;
 
-/// Images, and rows and columns of each, at one place in the network.
+/// Number of images, and their rows and columns, at one point in the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Size {
     pub images: usize,
@@ -16,17 +16,17 @@ pub struct Size {
 }
 
 impl Size {
-    /// Pixels of one image.
+    /// Returns the number of pixels of one image.
     pub fn pixels(self) -> usize {
         self.height * self.width
     }
 
-    /// Pixels of all images.
+    /// Returns the number of pixels of all images.
     pub fn count(self) -> usize {
         self.images * self.pixels()
     }
 
-    /// What a convolution makes of it.
+    /// Returns the size after a convolution.
     pub fn after(self, window: Window) -> Self {
         Self {
             images: self.images,
@@ -35,19 +35,19 @@ impl Size {
         }
     }
 
-    /// Images that one task takes: the batch in eight parts, whatever the number of threads, so that sums come out the same.
+    /// Returns the number of images per task: the batch in eight parts for any number of threads, so that sums are reproducible.
     pub fn images_per_task(self) -> usize {
         self.images.div_ceil(8)
     }
 
-    /// Images that one task takes where their pixels are multiplied by a matrix of weights: more where eight parts would have fewer than
-    /// 64 pixels, as each product reads all weights.
+    /// Returns the number of images per task for products with a weight matrix: more if eight parts would have fewer than 64 pixels each,
+    /// because each product reads all weights.
     pub fn images_per_product(self) -> usize {
         let least = MIN_PIXELS.div_ceil(self.pixels());
         self.images_per_task().max(least.min(self.images))
     }
 
-    /// Pixels that one task takes in products with weights.
+    /// Returns the number of pixels per task in products with weights.
     pub fn pixels_per_product(self) -> usize {
         self.images_per_product() * self.pixels()
     }
@@ -56,12 +56,12 @@ impl Size {
 /// Minimum number of pixels of a product with weights, except for the last product of a batch.
 const MIN_PIXELS: usize = 64;
 
-/// Pixels that are worked on at once, so that what belongs to them stays in the second-level cache (512 KiB).
+/// Returns the number of pixels processed at once, such that their values stay in the second-level cache (512 KiB).
 pub fn tile_pixels(values_per_pixel: usize) -> usize {
     (131_072 / values_per_pixel).max(64)
 }
 
-/// Parts of a run of pixels that belong to one image each: (image, pixels counted from the start of the run).
+/// Splits a run of pixels by image into (image, pixels counted from the start of the run).
 pub fn by_image(run: Range<usize>, size: Size) -> impl Iterator<Item = (usize, Range<usize>)> {
     let mut at = run.start;
     std::iter::from_fn(move || {
@@ -81,7 +81,7 @@ pub struct Images {
 }
 
 impl Images {
-    /// Those of one channel that somebody else owns.
+    /// Copies images of one channel.
     pub fn copied(images: &[f32], size: Size, pool: &Pool) -> Self {
         let mut pixels = pool.take(images.len());
         pixels.copy_from_slice(images);
@@ -108,7 +108,7 @@ pub struct BlockTape {
     pub gains: Vec<f32>,
 }
 
-/// A whole pass.
+/// Values of a complete pass.
 #[derive(Debug)]
 pub struct Tape {
     pub blocks: Vec<BlockTape>,

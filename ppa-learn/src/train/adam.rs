@@ -14,13 +14,13 @@ const EPSILON: f64 = 1e-8;
 /// Adam (Kingma and Ba 2015, arXiv:1412.6980, algorithm 1) without weight decay, with β₁ = 0.9, β₂ = 0.999, ε = 10⁻⁸.
 #[derive(Debug, Clone)]
 pub struct Adam {
-    /// Steps made.
+    /// Number of steps made.
     pub steps: u64,
-    /// Of each variable.
+    /// Moments of each variable.
     moments: Vec<Moments>,
 }
 
-/// The running means of a variable's gradient and of its square, where the variable is.
+/// Running means of a variable's gradient and of its square, on the variable's device.
 #[derive(Debug, Clone)]
 enum Moments {
     Cpu {
@@ -32,10 +32,10 @@ enum Moments {
 }
 
 impl Adam {
-    /// The state before the first step on flat variables.
+    /// Makes the state before the first step on flat variables.
     ///
     /// # Errors
-    /// If a device has no memory for it.
+    /// If a device runs out of memory.
     pub fn new(variables: &[&Var]) -> Result<Self, Error> {
         let zeros = variables.iter().map(|variable| {
             let zeros = vec![0.0; variable.elem_count()];
@@ -47,7 +47,7 @@ impl Adam {
         })
     }
 
-    /// The state after some steps, with the two moments of each variable.
+    /// Restores the state after some steps, with the two moments of each variable.
     pub(super) fn resume(
         steps: u64,
         moments: impl IntoIterator<Item = [Vec<f32>; 2]>,
@@ -61,7 +61,7 @@ impl Adam {
         })
     }
 
-    /// The two moments of each variable.
+    /// Returns the two moments of each variable.
     pub(super) fn moments(&self) -> Result<Vec<[Vec<f32>; 2]>, Error> {
         let values = |moments: &Moments| match moments {
             Moments::Cpu { first, second } => Ok([first.clone(), second.clone()]),
@@ -70,10 +70,10 @@ impl Adam {
         self.moments.iter().map(values).collect()
     }
 
-    /// Moves flat variables against their gradients; what has no gradient stays.
+    /// Updates flat variables by their gradients; variables without a gradient stay unchanged.
     ///
     /// # Errors
-    /// If a variable has another length than its moments.
+    /// If the lengths of a variable and its moments differ.
     pub fn step(
         &mut self,
         variables: &[&Var],
@@ -139,7 +139,7 @@ fn check_lengths(moments: usize, variable: usize, gradient: usize) -> Result<(),
     )))
 }
 
-/// One step of a variable, in place: copies of four million values would cost as much as the step itself.
+/// In-place step of a variable: copies of four million values would cost as much as the step itself.
 struct Update<'a> {
     /// In a mutex because an operation of candle is shared.
     moments: Mutex<(&'a mut [f32], &'a mut [f32])>,

@@ -4,8 +4,8 @@ use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Tensor, Var};
 
 use crate::device::launch::{Launch, contiguous_range};
 
-/// The decay at a step t: at most (1 + t) / (10 + t), as in TensorFlow's `ExponentialMovingAverage`, so that the average lags by a
-/// tenth of the steps made at most and soon forgets the first values.
+/// Returns the decay at a step t: at most (1 + t) / (10 + t), as in TensorFlow's `ExponentialMovingAverage`, so that the average lags
+/// by at most a tenth of the steps made and soon forgets the initial values.
 fn decay(most: f64, step: u64) -> f64 {
     most.min((1 + step) as f64 / (10 + step) as f64)
 }
@@ -13,12 +13,12 @@ fn decay(most: f64, step: u64) -> f64 {
 /// Averages of flat variables (Polyak and Juditsky 1992, with weights that decay by step).
 #[derive(Debug)]
 pub(super) struct Average {
-    /// One for each variable, where the variable is.
+    /// One average for each variable, on its device.
     values: Vec<Tensor>,
 }
 
 impl Average {
-    /// The values of variables before the first step.
+    /// Starts with the values of variables before the first step.
     pub fn new(variables: &[&Var]) -> Result<Self, Error> {
         let values = variables
             .iter()
@@ -28,7 +28,7 @@ impl Average {
         })
     }
 
-    /// The averages after some steps.
+    /// Restores the averages after some steps.
     pub fn resume(values: Vec<Vec<f32>>, device: &Device) -> Result<Self, Error> {
         let values = values
             .iter()
@@ -38,12 +38,12 @@ impl Average {
         })
     }
 
-    /// The average of each variable.
+    /// Returns the average of each variable.
     pub fn values(&self) -> Result<Vec<Vec<f32>>, Error> {
         self.values.iter().map(Tensor::to_vec1).collect()
     }
 
-    /// Adds the values after a step, `steps` having been made.
+    /// Adds the values of the variables after `steps` steps.
     pub fn add(&mut self, variables: &[&Var], most_decay: f64, steps: u64) -> Result<(), Error> {
         let share = (1.0 - decay(most_decay, steps)) as f32;
         for (average, variable) in self.values.iter_mut().zip(variables) {
@@ -64,7 +64,7 @@ impl Average {
     }
 }
 
-/// An average after a step, on a device.
+/// Returns an average after a step, on a device.
 fn moved(average: &Tensor, values: &Tensor, share: f32) -> Result<Tensor, Error> {
     check_lengths(average.elem_count(), values.elem_count())?;
     let launch = Launch::of_values("move_average", average.shape(), &[]);
@@ -80,7 +80,7 @@ fn check_lengths(averages: usize, values: usize) -> Result<(), Error> {
     }
 }
 
-/// One step of an average, in place: a copy of four million values would cost more than the step itself.
+/// In-place step of an average: a copy of four million values would cost more than the step itself.
 struct Move {
     share: f32,
 }
@@ -140,7 +140,7 @@ mod tests {
             average.values().unwrap()[0]
         );
         assert!(moved(&on_device.narrow(0, 0, 1).unwrap(), &variable, 0.1).is_err());
-        // A line is followed at a distance of decay / (1 - decay) steps.
+        // The average follows a line with a lag of decay / (1 - decay) steps.
         assert!((expected - 191.0).abs() < 1e-5, "{expected}");
         average.assign(&[&variable]).unwrap();
         let set = variable.to_vec1::<f32>().unwrap();

@@ -1,4 +1,4 @@
-//! Training batches and the outputs of the network for them, through all layers or through the last one only.
+//! Training batches and the network's outputs for them, computed by all layers or by the last one only.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use crate::network::{Mode, QualityNetwork};
 
 /// The endless sequence of training batches.
 pub(super) enum BatchSource {
-    /// Augmented images, through all layers.
+    /// Augmented images, for all layers.
     Images(Loader),
-    /// Linear probing: features of the images as evaluation sees them, which stay what they are while only the last
-    /// layer changes, so that each is computed once.
+    /// Linear probing: features of the evaluation images. They do not change, because only the last layer is trained, so each
+    /// is computed once.
     Features {
         /// [samples, 1280] of each camera.
         features: Vec<Tensor>,
@@ -25,7 +25,7 @@ pub(super) enum BatchSource {
     },
 }
 
-/// Outputs [samples, 1 or 2] for a batch, and what they should be.
+/// Outputs [samples, 1 or 2] for a batch, and their targets.
 pub(super) struct Outputs {
     pub outputs: Tensor,
     pub labels: Vec<f32>,
@@ -33,7 +33,7 @@ pub(super) struct Outputs {
 }
 
 impl BatchSource {
-    /// Batches from number `first_batch` on.
+    /// Starts with batch number `first_batch`.
     pub fn new(
         config: &TrainConfig,
         network: &QualityNetwork,
@@ -62,7 +62,7 @@ impl BatchSource {
         Ok(Self::Images(loader))
     }
 
-    /// Outputs of the network for batch number `step`, which must be the next one.
+    /// Computes the network's outputs for batch number `step`, which must be the next one.
     pub fn outputs(
         &mut self,
         config: &TrainConfig,
@@ -110,7 +110,7 @@ impl BatchSource {
     }
 }
 
-/// How training samples are drawn.
+/// Returns the sampler of the training samples.
 pub(super) fn drawing(config: &TrainConfig, images: &Images) -> Result<Balanced, TrainError> {
     let balanced = Balanced::new(images.samples())?;
     Ok(match config.balanced {
@@ -119,7 +119,7 @@ pub(super) fn drawing(config: &TrainConfig, images: &Images) -> Result<Balanced,
     })
 }
 
-/// Features of each sample's evaluation images, [samples, 1280] for each camera.
+/// Computes the features of each sample's evaluation images, [samples, 1280] for each camera.
 fn features(
     config: &TrainConfig,
     network: &QualityNetwork,
@@ -135,7 +135,7 @@ fn features(
     let batches: Vec<_> = batches.map(of_batch).collect::<Result<_, TrainError>>()?;
     let camera = |camera: usize| {
         let parts: Vec<_> = batches.iter().map(|batch| &batch[camera]).collect();
-        // Detached: the layers before have no gradient.
+        // Detached because the layers before have no gradient.
         Ok(Tensor::cat(&parts, 0)?.detach())
     };
     (0..network.cameras()).map(camera).collect()

@@ -1,4 +1,4 @@
-//! Warnings to give before a training begins.
+//! Warnings before a training run starts.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use super::config::TrainConfig;
 use super::error::TrainError;
 use crate::weights::WeightsMetadata;
 
-/// Sentences on what may make a training worthless and is not refused: severe findings of its datasets that no case acknowledges, and
-/// weights to start from that were trained with left limbs shown as right ones, where this training shows them as they are.
+/// Returns warnings about conditions that may make a training run worthless but are not errors: severe unacknowledged findings in its
+/// datasets, and initial weights that were trained with left limbs shown as right ones if this run shows them as they are.
 ///
 /// # Errors
 /// [`TrainError`] if findings or weights cannot be read.

@@ -1,4 +1,4 @@
-//! Weights and the state of a training in safetensors files.
+//! Weights and state of a training run in safetensors files.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -23,7 +23,7 @@ const ARCHITECTURE: &str = "efficientnet_b0";
 const FIRST: &str = "adam.first";
 const SECOND: &str = "adam.second";
 const AVERAGE: &str = "average";
-/// Key of what is not a tensor; a single one, so that equal trainings give equal bytes.
+/// Metadata key of everything that is not a tensor; a single one, so that equal training runs give equal bytes.
 const METADATA: &str = "ppa";
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -34,7 +34,7 @@ struct State {
     data: DataState,
 }
 
-/// Writes all that a training needs to continue.
+/// Writes everything that a training run needs to resume.
 pub(super) fn save(
     path: &Path,
     network: &QualityNetwork,
@@ -70,7 +70,7 @@ pub(super) fn save(
     write(path, tensors, Some([(METADATA.to_owned(), state)].into()))
 }
 
-/// Steps that the training of a checkpoint has made.
+/// Returns the number of steps in a checkpoint.
 pub(super) fn steps(path: &Path) -> Result<u64, TrainError> {
     let bytes = std::fs::read(path).map_err(at("read", path))?;
     let wrong = |message: String| TrainError::Checkpoint {
@@ -80,7 +80,7 @@ pub(super) fn steps(path: &Path) -> Result<u64, TrainError> {
     Ok(state(&bytes).map_err(wrong)?.steps)
 }
 
-/// What of a checkpoint is not a tensor, or why that cannot be read.
+/// Reads the part of a checkpoint that is not tensors, or returns why it cannot be read.
 fn state(bytes: &[u8]) -> Result<State, String> {
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
     let state = header.metadata().as_ref().and_then(|m| m.get(METADATA));
@@ -88,7 +88,7 @@ fn state(bytes: &[u8]) -> Result<State, String> {
     serde_json::from_str(state).map_err(|e| e.to_string())
 }
 
-/// Puts a checkpoint's values into a network, its moments into Adam, and its averages, if the training has them, into an average.
+/// Loads a checkpoint's values into a network, its moments into Adam, and its averages, if there are any, into an average.
 pub(super) fn load(
     path: &Path,
     network: &QualityNetwork,

@@ -1,8 +1,8 @@
-//! Why a configuration is not valid.
+//! Errors of configurations.
 
 use std::path::PathBuf;
 
-/// A configuration that cannot be.
+/// Error in a configuration.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
@@ -11,7 +11,7 @@ pub enum ConfigError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// It is not TOML, or has missing or unknown keys.
@@ -19,18 +19,18 @@ pub enum ConfigError {
     Parse {
         /// The file.
         path: PathBuf,
-        /// What and where.
+        /// The error and its position.
         message: String,
     },
-    /// No such preset.
+    /// An unknown preset.
     #[error("{}: unknown preset {found:?}; expected \"quick\", \"standard\" or \"paper\"", path.display())]
     Preset {
         /// The file.
         path: PathBuf,
-        /// What stands there.
+        /// The name found.
         found: String,
     },
-    /// It cannot be written as TOML, as with a path that is not UTF-8.
+    /// It cannot be written as TOML, for example because a path is not UTF-8.
     #[error("the configuration cannot be written as TOML: {0}")]
     Write(String),
     /// A number out of range.
@@ -40,7 +40,7 @@ pub enum ConfigError {
         key: &'static str,
         /// Its value.
         found: String,
-        /// What it could be.
+        /// Range of valid values.
         expected: &'static str,
     },
 }

@@ -6,7 +6,7 @@ use super::config::TrainConfig;
 use super::config_error::ConfigError;
 
 impl TrainConfig {
-    /// Reads a TOML file: `preset = "paper"`, `"standard"` or `"quick"`, and every key that shall differ from it.
+    /// Reads a TOML file: `preset = "paper"`, `"standard"` or `"quick"`, and every key that differs from it.
     ///
     /// # Errors
     /// [`ConfigError`] naming file and key.
@@ -14,17 +14,17 @@ impl TrainConfig {
         Self::of_keys(read_table(path)?, path)
     }
 
-    /// The configuration whose keys a file at `path` would hold, which need not be there.
+    /// Makes the configuration from the keys of a file at `path`, which need not exist.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// The same as [`read`](Self::read).
     pub fn of_keys(keys: toml::Table, path: &Path) -> Result<Self, ConfigError> {
         let unreadable = |source| ConfigError::Read {
             path: path.to_owned(),
             source,
         };
         let mut config = Self::from_table(keys, path)?;
-        // Whole paths, so that the echo in another folder says the same.
+        // Absolute paths, so that the copy in another folder has the same meaning.
         let whole = std::path::absolute(path).map_err(unreadable)?;
         let folder = whole.parent().unwrap_or(Path::new(""));
         for source in config.training.iter_mut().chain(&mut config.evaluation) {
@@ -35,21 +35,21 @@ impl TrainConfig {
         Ok(config)
     }
 
-    /// Reads the `config.toml` of a training's folder, which holds every key that the program knew which wrote it.
+    /// Reads the `config.toml` in the folder of a training run, which contains every key known to the program that wrote it.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// The same as [`read`](Self::read).
     pub fn read_run(folder: &Path) -> Result<Self, ConfigError> {
         let path = folder.join("config.toml");
         let mut given = read_table(&path)?;
-        // Programs that did not know the key showed limbs as they are, whatever the preset says now.
+        // Programs without this key showed limbs as they are, whatever the preset is now.
         given.entry("mirror").or_insert(toml::Value::Boolean(false));
         let config = Self::from_table(given, &path)?;
         config.check()?;
         Ok(config)
     }
 
-    /// The configuration that a table of the file `path` says: its preset and every key that differs.
+    /// Makes the configuration from a table of the file `path`: its preset and every key that differs.
     ///
     /// # Errors
     /// [`ConfigError`] naming file and key.
@@ -88,7 +88,7 @@ fn wrong(path: &Path, error: &dyn std::fmt::Display) -> ConfigError {
     }
 }
 
-/// Puts every value that is given over the one that stands there; tables are merged key by key.
+/// Overwrites the values in `all` by those in `given`; tables are merged key by key.
 pub(crate) fn merge(all: &mut toml::Table, given: toml::Table) {
     for (key, value) in given {
         match (all.get_mut(&key), value) {

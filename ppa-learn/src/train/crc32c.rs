@@ -1,6 +1,6 @@
 //! The checksum of TFRecord files.
 
-/// CRC-32C (Castagnoli; polynomial 0x1EDC6F41, here bit-reversed) of some bytes.
+/// Computes the CRC-32C (Castagnoli; polynomial 0x1EDC6F41, here bit-reversed) of `bytes`.
 pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     let of_byte = |crc: u32, &byte: &u8| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| {

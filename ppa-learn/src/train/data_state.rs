@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 
 use crate::data::{Sample, SampleImage};
 
-/// Number of samples and hashes of what is known of them before any image is decoded; not where the dataset lies.
+/// Number of samples, and hashes of their properties before any image is decoded, without the location of the dataset.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct DataState {
     samples: usize,
@@ -16,7 +16,7 @@ pub(super) struct DataState {
 }
 
 impl DataState {
-    /// Of training samples in their order, which batches depend on.
+    /// Computes the state of training samples in their order, on which batches depend.
     pub fn of(samples: &[Sample]) -> Self {
         let each = |image: fn(&SampleImage) -> String| {
             hash(samples.iter().flat_map(|s| &s.images).map(image))
@@ -33,7 +33,7 @@ impl DataState {
         }
     }
 
-    /// What differs from the samples of a checkpoint; none if nothing does.
+    /// Describes the difference from the samples of a checkpoint; `None` if there is none.
     pub fn differs(&self, before: &Self) -> Option<String> {
         if self.samples != before.samples {
             let (now, then) = (self.samples, before.samples);

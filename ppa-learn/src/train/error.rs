@@ -1,4 +1,4 @@
-//! Why a training cannot begin, continue or be evaluated.
+//! Errors of training runs.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,28 +13,28 @@ use crate::weights::WeightsError;
 use super::config_error::ConfigError;
 use super::finite::NonFinite;
 
-/// Why a training cannot begin, continue or be evaluated.
+/// Error in starting, resuming or evaluating a training run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrainError {
-    /// The configuration.
+    /// An error in the configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// A device that cannot be used.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// Images, labels or the split.
+    /// An error in images, labels or the split.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// Corrections to learn, and none known.
+    /// Corrections should be learned, but none is known.
     #[error(
         "correction_weight is more than 0, but no training sample has a correction: expected rotated poses, not all inadequate"
     )]
     NoCorrection,
-    /// A file.
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The network.
+    /// An error of the network.
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// Weights that do not fit, or cannot be read or written.
@@ -45,39 +45,39 @@ pub enum TrainError {
     Checkpoint {
         /// The file.
         path: PathBuf,
-        /// What was found and what expected.
+        /// What was found and what was expected.
         message: String,
     },
-    /// A folder with weights, but nothing to continue from.
+    /// A folder with weights, but without a checkpoint to resume from.
     #[error("{} exists without a checkpoint to resume from; use another folder", .0.display())]
     WeightsAlone(PathBuf),
-    /// A dataset where a training was to be written.
+    /// The folder for a training run is a dataset.
     #[error("{} is a dataset; choose another folder for the training", .0.display())]
     Dataset(PathBuf),
-    /// A training that is not finished, where a finished one is needed.
+    /// A training run that is not finished, although a finished one is needed.
     #[error("the training in {} is not finished: {step} of {} are done; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]
     Unfinished {
         /// The folder.
         folder: PathBuf,
-        /// Steps that its checkpoint holds.
+        /// Number of steps in its checkpoint.
         step: u64,
-        /// Steps of the whole training.
+        /// Total number of steps.
         steps: u64,
     },
-    /// A folder of another training, or of something else.
+    /// The folder of another training run, or of something else.
     #[error("{} holds another configuration, with no checkpoint next to it to resume from; choose another folder", .0.display())]
     OtherConfig(PathBuf),
-    /// Numbers that are not finite.
+    /// A loss or gradient that is not finite.
     #[error("step {step}: the loss is {loss}; {place}")]
     NotFinite {
         /// The step, from 0.
         step: u64,
         /// Its loss.
         loss: f32,
-        /// Where it began.
+        /// Where the first non-finite number appeared.
         place: NonFinite,
     },
-    /// candle's arithmetic.
+    /// An error of candle.
     #[error("a computation failed")]
     Candle(#[from] candle_core::Error),
 }
@@ -88,7 +88,7 @@ impl From<WeightsError> for TrainError {
     }
 }
 
-/// Names the file and what was done to it.
+/// Returns a function that adds the action and the file to an I/O error.
 pub(super) fn at<'a>(
     action: &'static str,
     path: &'a Path,

@@ -7,14 +7,14 @@ use candle_core::{Error, Storage, Tensor, Var};
 
 use crate::network::{Entry, Place, QualityNetwork};
 
-/// The layer at which numbers stopped being finite.
+/// The layer with the first non-finite numbers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum NonFinite {
-    /// A parameter: the step before was too far.
+    /// A parameter: the previous step was too large.
     Parameter(String),
-    /// Running statistics: the first layer whose values were not finite on the way forward.
+    /// Running statistics: the first layer with non-finite values in the forward pass.
     Forward(String),
-    /// A gradient: the first layer on the way back.
+    /// A gradient: the first layer in the backward pass.
     Backward(String),
     /// Inputs, labels or the last layer.
     Output,
@@ -33,7 +33,7 @@ impl fmt::Display for NonFinite {
     }
 }
 
-/// Where it began, on a network whose loss or gradient is not finite.
+/// Finds the first non-finite numbers of a network whose loss or gradient is not finite.
 pub(super) fn first_non_finite(
     network: &QualityNetwork,
     gradients: &GradStore,
@@ -68,16 +68,16 @@ fn is_bad(flat: &[f32], entry: &Entry) -> bool {
     flat[entry.range.clone()].iter().any(|x| !x.is_finite())
 }
 
-/// Whether all values of a tensor are finite.
+/// Returns whether all values of a tensor are finite.
 pub(super) fn is_finite(tensor: &Tensor) -> Result<bool, Error> {
     let (storage, layout) = tensor.storage_and_layout();
     match (&*storage, layout.contiguous_offsets()) {
-        // Without a copy of four million values.
+        // Avoids a copy of four million values.
         (Storage::Cpu(values), Some((start, end))) => {
             let values = &values.as_slice::<f32>()?[start..end];
             Ok(values.iter().all(|x| x.is_finite()))
         }
-        // 0 times a number is 0, times infinity or NaN it is NaN.
+        // 0 times a finite number is 0; 0 times infinity or NaN is NaN.
         _ => Ok((tensor.detach() * 0.0)?.sum_all()?.to_scalar::<f32>()? == 0.0),
     }
 }

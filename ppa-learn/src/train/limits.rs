@@ -1,10 +1,10 @@
-//! Limits on the settings of a training.
+//! Limits on the settings of a training run.
 
 use super::config::TrainConfig;
 use super::config_error::ConfigError;
 
 impl TrainConfig {
-    /// Refuses numbers that no training can have.
+    /// Refuses numbers outside their valid ranges.
     ///
     /// # Errors
     /// [`ConfigError::Range`] naming the key.

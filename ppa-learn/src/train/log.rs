@@ -1,4 +1,4 @@
-//! The scalars of a training, one line of JSON per row.
+//! The scalars of a training run, one line of JSON per row.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -10,14 +10,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::{TrainError, at};
 
-/// What was measured after a step.
+/// Measurements after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LogRow {
-    /// Steps made.
+    /// Number of steps made.
     pub step: u64,
-    /// Seconds of training so far, all runs of it together.
+    /// Training time so far in seconds, including the time before interruptions.
     pub seconds: f64,
-    /// Values by TensorBoard's tags; NaN for those that JSON cannot hold.
+    /// Values by TensorBoard's tags; NaN for values that JSON cannot represent.
     #[serde(flatten, deserialize_with = "null_is_nan")]
     pub scalars: BTreeMap<String, f64>,
 }
@@ -29,10 +29,10 @@ fn null_is_nan<'de, D: Deserializer<'de>>(row: D) -> Result<BTreeMap<String, f64
         .collect())
 }
 
-/// The rows of a log; a line that was cut short by a crash ends it.
+/// Reads the rows of a log, up to a line truncated by a crash.
 ///
 /// # Errors
-/// [`FileError`] if it is there but cannot be read.
+/// [`FileError`] if the log exists but cannot be read.
 pub fn read_log(path: &Path) -> Result<Vec<LogRow>, FileError> {
     if !path.exists() {
         return Ok(Vec::new());
@@ -53,7 +53,7 @@ pub(super) struct Log {
 }
 
 impl Log {
-    /// Goes on with a log after `step`; what was written behind it is taken away.
+    /// Continues a log after `step` and removes later rows.
     pub fn resume(path: &Path, step: u64) -> Result<Self, TrainError> {
         let mut rows = read_log(path)?;
         rows.retain(|row| row.step <= step);

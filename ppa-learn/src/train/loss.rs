@@ -5,8 +5,8 @@ use candle_core::{Error, Tensor};
 use super::batch_source::Outputs;
 use crate::network::CORRECTION_UNIT_DEG;
 
-/// The mean squared error of the quality; with a `correction_weight`, plus that times the mean squared error of the correction, in
-/// units of 30°, over the samples of which it is known.
+/// Computes the mean squared error of the quality, plus `correction_weight` times the mean squared error of the correction, in
+/// units of 30°, over the samples for which it is known.
 pub(super) fn loss(batch: &Outputs, correction_weight: f64) -> Result<Tensor, Error> {
     let outputs = &batch.outputs;
     let column = |values: Vec<f32>| Tensor::new(values, outputs.device())?.unsqueeze(1);

@@ -1,4 +1,4 @@
-//! What a training is measured by: errors on evaluation and training images.
+//! Measurements of a training run: errors on evaluation and training images.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,16 +9,16 @@ use super::trained::predict_in_order;
 use crate::data::{Images, Order, Sample};
 use crate::network::{PosePrediction, QualityNetwork};
 
-/// The scalar that every evaluation has in the log.
+/// A scalar that every evaluation writes to the log.
 pub(super) const EVALUATION: &str = "evaluation/mae";
-/// Most training samples whose error is measured.
+/// Maximum number of training samples whose error is measured.
 const MOST_TRAINING_SAMPLES: usize = 256;
 
-/// Mean absolute and squared error and Spearman's correlation on evaluation images, the mean absolute error on at most 256 training
-/// samples, evenly spread and not augmented, and how much larger that on evaluation images is; the mean absolute error of
-/// corrections where they are predicted and known.
+/// Measures mean absolute and squared error and Spearman's correlation on evaluation images, the mean absolute error on at most 256
+/// evenly spaced training samples without augmentation, and how much larger that on evaluation images is; also the mean absolute error
+/// of corrections if they are predicted and known.
 ///
-/// The correlation is NaN where labels or answers are all the same, and where an answer is not finite.
+/// The correlation is NaN if all labels or all predictions are the same, or if a prediction is not finite.
 pub(super) fn scalars(
     config: &TrainConfig,
     network: &QualityNetwork,
@@ -53,7 +53,7 @@ pub(super) fn scalars(
     Ok(named.map(|(tag, x)| (tag.to_owned(), x)).collect())
 }
 
-/// `None` where no correction is both predicted and known.
+/// Returns `None` if no correction is both predicted and known.
 fn correction_mae_deg(samples: &[Sample], predictions: &[PosePrediction]) -> Option<f64> {
     let both = samples.iter().zip(predictions);
     let errors = both.filter_map(|(s, p)| Some((s.correction_deg? - p.correction_deg?).abs()));

@@ -1,9 +1,9 @@
-//! Training of a network, from a configuration to weights: resumable, with the same bytes no matter when it was interrupted.
+//! Training of a network, from a configuration to weights. It can be resumed, and gives the same bytes however it was interrupted.
 //!
-//! [`train`] follows a [`TrainConfig`] and fills a run folder: `config.toml` (what was resolved), `log.jsonl` and TensorBoard
-//! events (the same scalars), `start.json` (what was not taken unchanged from the `start` file), `checkpoint.safetensors` (weights by torchvision's
-//! names, running statistics, Adam's moments, averaged weights, step), and at the end `weights.safetensors`. Data position and random numbers follow
-//! from seed and step.
+//! [`train`] follows a [`TrainConfig`] and fills a run folder: `config.toml` (the resolved configuration), `log.jsonl` and TensorBoard
+//! events (the same scalars), `start.json` (what was not taken unchanged from the `start` file), `checkpoint.safetensors` (weights by
+//! torchvision's names, running statistics, Adam's moments, averaged weights, step), and at the end `weights.safetensors`. Data
+//! position and random numbers follow from seed and step.
 
 mod adam;
 mod average;

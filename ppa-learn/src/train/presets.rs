@@ -1,4 +1,4 @@
-//! Default settings of a training.
+//! Presets of training configurations.
 
 use std::num::NonZeroUsize;
 
@@ -10,7 +10,7 @@ use crate::network::{Fusion, Options};
 use crate::weights::FirstConvolution;
 
 impl TrainConfig {
-    /// The paper's training, without data. Besides, left limbs are shown as right ones, which the paper does not do: `mirror = false`
+    /// Returns the paper's configuration, without data. Unlike in the paper, left limbs are shown as right ones: `mirror = false`
     /// leaves them as they are.
     pub fn paper() -> Self {
         let number = |n| NonZeroUsize::new(n).expect("the numbers below are not 0");
@@ -51,18 +51,18 @@ impl TrainConfig {
         }
     }
 
-    /// 3000 steps of 32 images of 48 x 48 pixels, for a quarter of an hour.
+    /// Returns a configuration of 3000 steps of 32 images of 48 x 48 pixels, for a quarter of an hour.
     ///
-    /// As [`quick`](Self::quick), and besides:
+    /// The differences from [`quick`](Self::quick) are:
     ///
     /// * Steps of 32 images instead of 16: normalisation by the batch mixes less of other poses into a prediction, and the learning rate
     ///   can be twice as high.
-    /// * The learning rate rises over 100 steps, since Adam's first steps have full length whatever the gradient, and falls to 0 along a
+    /// * The learning rate rises over 100 steps, because Adam's first steps have full length for any gradient, and falls to 0 along a
     ///   cosine.
-    /// * An average of the weights is evaluated and saved: single steps scatter.
-    /// * Running statistics are the mean of 16 batches, 512 images. Those that training leaves lag behind its weights: in its first
+    /// * An average of the weights is evaluated and saved, because the weights of single steps fluctuate.
+    /// * Running statistics are the mean of 16 batches, 512 images. Those of training lag behind its weights: in the first
     ///   hundred steps predictions are then nearly constant (`early_answers_are_nearly_constant_with_lagging_ones`).
-    /// * Samples are drawn as often as they are in the data, since the mean absolute error counts them so.
+    /// * Samples are drawn as often as they occur in the data, because the mean absolute error weights them in this way.
     pub fn standard() -> Self {
         let quick = Self::quick();
         Self {
@@ -80,12 +80,12 @@ impl TrainConfig {
         }
     }
 
-    /// The paper's training with images of 48 x 48 pixels and 400 steps, for minutes on two cores.
+    /// Returns the paper's configuration with images of 48 x 48 pixels and 400 steps, which takes minutes on two cores.
     ///
-    /// Besides, it leaves out what 400 steps are too few for, in PyTorch as well:
+    /// It also omits what does not work with only 400 steps, in PyTorch as well:
     ///
-    /// * The last layer begins in the middle of the labels. From torchvision's first values a thousand steps would only get there.
-    /// * Nothing is left out at random, and images are neither mirrored nor rotated.
+    /// * The last layer starts in the middle of the labels. From torchvision's initial values this alone would take a thousand steps.
+    /// * There is no dropout, and images are neither mirrored nor rotated.
     /// * Images are not blurred: a box of 3 to 7 of 48 pixels would be one of 21 to 49 of the paper's 336. As the paper's boxes average
     ///   its noise over 9 to 49 pixels, noise that is not blurred has a 25th of the variance.
     pub fn quick() -> Self {

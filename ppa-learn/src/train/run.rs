@@ -1,4 +1,4 @@
-//! The loop of a training.
+//! The training loop.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,33 +25,33 @@ use super::trained::{network, samples};
 /// Training progress, reported after every step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// Steps made.
+    /// Number of steps made.
     pub step: u64,
-    /// Steps in all.
+    /// Total number of steps.
     pub steps: u64,
-    /// Loss of the step's batch: the mean squared error of the quality, and the weighted one of corrections.
+    /// Loss of the step's batch: the mean squared error of the quality plus the weighted one of corrections.
     pub loss: f32,
     /// Learning rate of the step.
     pub learning_rate: f64,
 }
 
-/// How a training ended.
+/// Outcome of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
     /// All steps are made.
     Finished,
-    /// It was asked to stop; the checkpoint holds the steps made so far.
+    /// It was stopped on request; the checkpoint holds the steps made so far.
     Stopped {
-        /// Steps made.
+        /// Number of steps made.
         step: u64,
     },
 }
 
-/// Trains as a configuration says, in a folder; continues from the folder's checkpoint, if there is one, to the same bytes
-/// as a training that was never stopped.
+/// Trains according to a configuration in a folder; resumes from the folder's checkpoint, if there is one, with the same bytes
+/// as a training run that was never stopped.
 ///
 /// # Errors
-/// [`TrainError`]. Where an image is at fault, the checkpoint holds all steps made before; else it is the last whole one.
+/// [`TrainError`]. If an image is the cause, the checkpoint holds all steps made before; otherwise it is the last complete one.
 pub fn train(
     config: &TrainConfig,
     folder: &Path,
@@ -70,7 +70,7 @@ pub fn train(
         return Err(TrainError::NoCorrection);
     }
     let echoed = toml::to_string(config).map_err(|e| ConfigError::Write(e.to_string()))?;
-    Balanced::new(&training)?; // Labels outside the scale are found before training.
+    Balanced::new(&training)?; // Finds labels outside the scale before training.
     if !evaluation.is_empty() {
         Balanced::new(&evaluation)?;
     }
@@ -121,7 +121,7 @@ pub fn train(
     run.make_up_evaluation()?;
     while run.adam.steps < steps {
         let outputs = match batches.outputs(config, &run.network, run.adam.steps) {
-            // An image that cannot be used costs no step that was made.
+            // An unusable image does not lose completed steps.
             Err(error @ TrainError::Data(_)) if run.adam.steps > 0 => {
                 run.save(&checkpoint, false)?;
                 return Err(error);
@@ -137,7 +137,7 @@ pub fn train(
             run.log_step(&progress)?;
         }
         if due(config.checkpoint_every) || stopped {
-            // An evaluation that is due is made by a training that stops here as well: the log is that of one that does not stop.
+            // An evaluation that is due is also made when stopping here, so that the log is that of an uninterrupted run.
             run.save(&checkpoint, due(config.checkpoint_every))?;
         }
         if stopped && step < steps {

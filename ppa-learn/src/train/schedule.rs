@@ -1,31 +1,31 @@
-//! Number of steps, and learning rate of each.
+//! Number of steps, and the learning rate of each.
 
 use std::f64::consts::PI;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Of [`DROPS_OF`]: where the rate is divided by ten, 190 000, 195 000, 199 000 and 199 500 of the paper's 200 000 steps.
+/// Fractions of [`DROPS_OF`] at which the rate is divided by ten: 190 000, 195 000, 199 000 and 199 500 of the paper's 200 000 steps.
 const DROPS: [u64; 4] = [380, 390, 398, 399];
 const DROPS_OF: u64 = 400;
-/// Batches that the authors' code trains on before it looks at [`EVALUATING`] test batches.
+/// Number of batches that the authors' code trains on before it evaluates [`EVALUATING`] test batches.
 const TRAINING: u64 = 440;
-/// Test batches between two rounds of training batches.
+/// Number of test batches between two rounds of training batches.
 const EVALUATING: u64 = 60;
 
-/// What `steps` counts.
+/// Unit of `steps`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StepCounting {
     /// Steps of the optimiser, as the paper's text says.
     Optimiser,
-    /// Batches of training and test together, 440 and 60 in turn, as the authors' code counts: 176 000 steps of the
+    /// Batches of training and test together, 440 and 60 in turn, as counted by the authors' code: 176 000 steps of the
     /// optimiser for 200 000. Only training batches are computed here; evaluation has its own interval.
     Batches,
 }
 
 impl fmt::Display for StepCounting {
-    /// As in configurations.
+    /// Writes the name used in configurations.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Optimiser => "optimiser",
@@ -34,7 +34,7 @@ impl fmt::Display for StepCounting {
     }
 }
 
-/// How the learning rate falls.
+/// Decay of the learning rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RateSchedule {
@@ -48,20 +48,20 @@ pub enum RateSchedule {
 /// Learning rates by step of the optimiser.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
-    /// What is counted.
+    /// Unit of `count`.
     pub counting: StepCounting,
-    /// How many of it there are.
+    /// Number of steps in that unit.
     pub count: u64,
-    /// The highest rate: of the first step after the warm-up.
+    /// Highest rate: that of the first step after the warm-up.
     pub first_rate: f64,
-    /// How it falls.
+    /// Decay of the rate.
     pub shape: RateSchedule,
-    /// Steps of the optimiser over which the rate rises evenly to the highest one.
+    /// Number of optimiser steps over which the rate rises linearly to the highest one.
     pub warm_up: u64,
 }
 
 impl Schedule {
-    /// Steps of the optimiser.
+    /// Returns the number of optimiser steps.
     pub fn steps(&self) -> u64 {
         match self.counting {
             StepCounting::Optimiser => self.count,
@@ -72,9 +72,9 @@ impl Schedule {
         }
     }
 
-    /// Rate of a step of the optimiser; the first one is step 0.
+    /// Returns the rate of an optimiser step; the first one is step 0.
     ///
-    /// Step s of W warm-up steps has (s + 1) / (W + 1) of the rate that the schedule gives.
+    /// Step s of W warm-up steps has (s + 1) / (W + 1) of the scheduled rate.
     pub fn learning_rate(&self, step: u64) -> f64 {
         let warm = (step + 1) as f64 / (self.warm_up + 1) as f64;
         warm.min(1.0)

@@ -1,4 +1,4 @@
-//! Record of the parameters that a training did not take unchanged from its `start` file.
+//! Record of the parameters that a training run did not take unchanged from its `start` file.
 
 use std::path::{Path, PathBuf};
 
@@ -17,10 +17,10 @@ pub(super) fn write(folder: &Path, loaded: &Loaded) -> Result<(), TrainError> {
     Ok(write_whole(&path(folder), json.as_bytes())?)
 }
 
-/// What the training in a folder did not take from its `start` file as it stood; none without such a file.
+/// Reads what the training run in a folder did not take unchanged from its `start` file; `None` if there is no `start.json`.
 ///
 /// # Errors
-/// [`TrainError::File`] if `start.json` is there but cannot be read.
+/// [`TrainError::File`] if `start.json` exists but cannot be read.
 pub fn read_start(folder: &Path) -> Result<Option<Loaded>, TrainError> {
     let path = path(folder);
     if !path.exists() {

@@ -1,4 +1,4 @@
-//! Running statistics of a network that no training step has moved, such as one with averaged weights.
+//! Recomputed running statistics of a network, such as one with averaged weights.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use super::trained::tensors;
 use crate::data::{Images, Loader, Order};
 use crate::network::{Mode, QualityNetwork};
 
-/// Sets the running statistics to the mean of those of the first `recompute_statistics` batches of the training.
+/// Sets the running statistics to the mean of those of the first `recompute_statistics` training batches.
 ///
-/// The batches are drawn as those of training, since the weights were fitted to statistics of such a mixture; their images are not
-/// augmented and nothing is left out, as in evaluation. The statistics therefore depend on weights, data and seed alone.
+/// The batches are drawn as in training, because the weights were fitted to statistics of such a mixture; as in evaluation, images
+/// are not augmented and there is no dropout. The statistics therefore depend only on weights, data and seed.
 pub(super) fn recompute_statistics(
     config: &TrainConfig,
     network: &QualityNetwork,

@@ -1,4 +1,4 @@
-//! The steps of a training, with measurements and checkpoints between them.
+//! The steps of a training run, with measurements and checkpoints between them.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -25,12 +25,12 @@ use super::run::Progress;
 use super::statistics::recompute_statistics;
 use super::tensorboard::tensorboard_events;
 
-/// Whether what is done every `every` steps is done after `step`; all is after the last one.
+/// Returns whether an action that is due every `every` steps is due after `step`; after the last step it always is.
 pub(super) fn is_due(every: NonZeroUsize, step: u64, steps: u64) -> bool {
     step.is_multiple_of(every.get() as u64) || step == steps
 }
 
-/// A training under way.
+/// State of a training run.
 pub(super) struct Run<'a> {
     pub config: &'a TrainConfig,
     pub folder: &'a Path,
@@ -40,14 +40,14 @@ pub(super) struct Run<'a> {
     pub average: Option<Average>,
     pub log: Log,
     pub started: Instant,
-    /// Of earlier runs of the same training.
+    /// Seconds before interruptions of the same training run.
     pub seconds_before: f64,
     pub training: Arc<Images>,
     pub evaluation: Option<Arc<Images>>,
 }
 
 impl Run<'_> {
-    /// Makes a step from what the network said of a batch.
+    /// Makes a step from the network's outputs for a batch.
     pub fn step(&mut self, batch: Outputs) -> Result<Progress, TrainError> {
         let step = self.adam.steps;
         let loss = loss(&batch, self.config.correction_weight)?;
@@ -82,10 +82,10 @@ impl Run<'_> {
         })
     }
 
-    /// The network that is evaluated and saved: with averaged weights and statistics computed again, if the configuration asks for them.
+    /// Returns the network that is evaluated and saved: with averaged weights and recomputed statistics, if configured.
     pub fn evaluated_network(&self) -> Result<QualityNetwork, TrainError> {
         let config = self.config;
-        // The features of linear probing belong to the statistics of its start.
+        // The features of linear probing are computed with the statistics of its start.
         let recomputed = config.recompute_statistics > 0 && config.layers == Layers::All;
         if self.average.is_none() && !recomputed {
             return Ok(self.network.clone());
@@ -104,7 +104,7 @@ impl Run<'_> {
         self.seconds_before + self.started.elapsed().as_secs_f64()
     }
 
-    /// Adds a row of a step to the log.
+    /// Adds a row for a step to the log.
     pub fn log_step(&mut self, progress: &Progress) -> Result<(), TrainError> {
         let scalars = [
             ("training/loss".to_owned(), f64::from(progress.loss)),
@@ -117,7 +117,7 @@ impl Run<'_> {
         })
     }
 
-    /// Evaluates after the step of the checkpoint, if that was due and failed when the step was made.
+    /// Repeats an evaluation that was due at the checkpoint's step but failed.
     pub fn make_up_evaluation(&mut self) -> Result<(), TrainError> {
         let step = self.adam.steps;
         let due = is_due(
@@ -134,7 +134,7 @@ impl Run<'_> {
         self.write_events()
     }
 
-    /// Adds a row of the evaluation to the log, if there is anybody to evaluate on.
+    /// Adds a row for an evaluation to the log, if there are evaluation images.
     fn evaluate(&mut self) -> Result<(), TrainError> {
         if let Some(evaluation) = &self.evaluation {
             let network = self.evaluated_network()?;
@@ -148,13 +148,13 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Writes the checkpoint and, from the log, the events; evaluates before, if asked.
+    /// Writes the checkpoint and, from the log, the events; evaluates before that if `evaluate`.
     pub fn save(&mut self, checkpoint: &Path, evaluate: bool) -> Result<(), TrainError> {
         let evaluated = match evaluate {
             true => self.evaluate(),
             false => Ok(()),
         };
-        // An evaluation that fails costs no steps.
+        // An evaluation that fails does not lose steps.
         let Self {
             network,
             adam,
@@ -168,7 +168,7 @@ impl Run<'_> {
         self.write_events()
     }
 
-    /// Writes TensorBoard's events from the log.
+    /// Writes TensorBoard events from the log.
     fn write_events(&self) -> Result<(), TrainError> {
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let started = now.map_or(0.0, |now| now.as_secs_f64()) - self.seconds();

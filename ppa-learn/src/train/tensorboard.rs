@@ -1,9 +1,9 @@
-//! Scalars as TensorBoard reads them: TFRecord frames around protobuf messages, written by hand.
+//! Scalars in TensorBoard's format: hand-written TFRecord frames around protobuf messages.
 
 use super::crc32c::crc32c;
 use super::log::LogRow;
 
-/// The bytes of an events file with all scalars of a log; `started_unix_s` is when its clock was 0.
+/// Encodes an events file with all scalars of a log; `started_unix_s` is the Unix time at second 0 of the log.
 ///
 /// Messages are TensorFlow's Event (wall_time 1, step 2, file_version 3, summary 5), Summary (value 1) and Value (tag 1,
 /// simple_value 2).
@@ -31,7 +31,7 @@ pub fn tensorboard_events(rows: &[LogRow], started_unix_s: f64) -> Vec<u8> {
     file
 }
 
-/// Length, its masked checksum, data, its masked checksum.
+/// Writes a frame: length, its masked checksum, data, its masked checksum.
 fn frame(file: &mut Vec<u8>, data: &[u8]) {
     let length = (data.len() as u64).to_le_bytes();
     file.extend(length);
@@ -73,7 +73,7 @@ fn bytes(message: &mut Vec<u8>, field: u64, value: &[u8]) {
 mod tests {
     use super::*;
 
-    /// The bytes that TensorFlow's protobuf and TFRecord writers give, worked out by hand; Python's tensorboard reads them.
+    /// The bytes that TensorFlow's protobuf and TFRecord writers give, derived by hand; Python's tensorboard reads them.
     #[test]
     fn one_scalar_by_hand() {
         let row = LogRow {

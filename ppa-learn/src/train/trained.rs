@@ -1,4 +1,4 @@
-//! The network and the samples of a configuration, and the network's predictions.
+//! Network and samples of a configuration, and the network's predictions.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -16,7 +16,7 @@ use super::error::TrainError;
 /// The middle of the labels, 1 to 3.
 const MIDDLE: f32 = 2.0;
 
-/// The network that a configuration begins with.
+/// Makes the initial network of a configuration.
 pub(super) fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError> {
     let options = Options {
         dropout: config.network.dropout,
@@ -30,10 +30,10 @@ pub(super) fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError
     Ok(network)
 }
 
-/// The network of a finished training on the CPU: its configuration and its weights, from its folder.
+/// Reads the configuration and the network, on the CPU, from the folder of a finished training run.
 ///
 /// # Errors
-/// [`TrainError`] naming the file that is missing or is none of a training; [`TrainError::Unfinished`] with the steps made so far.
+/// [`TrainError`] naming the missing or invalid file; [`TrainError::Unfinished`] with the steps made so far.
 pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainError> {
     let config = TrainConfig::read_run(folder)?;
     let weights = folder.join("weights.safetensors");
@@ -49,7 +49,7 @@ pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainErro
     Ok((config, network))
 }
 
-/// Steps of the optimiser that the checkpoint of a training holds; 0 without one.
+/// Returns the number of optimiser steps in the checkpoint of a training run; 0 if there is no checkpoint.
 ///
 /// # Errors
 /// [`TrainError`] naming a checkpoint that cannot be read.
@@ -61,7 +61,7 @@ pub fn steps_made(folder: &Path) -> Result<u64, TrainError> {
     }
 }
 
-/// The labelled samples of some sources, as a training reads them.
+/// Reads the labelled samples of sources, as in training.
 ///
 /// # Errors
 /// [`TrainError`] for data that cannot be used.
@@ -73,7 +73,7 @@ pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, 
     Ok(samples)
 }
 
-/// Images of each camera as a tensor [samples, 1, side, side] on a device.
+/// Returns the images of each camera as a tensor [samples, 1, side, side] on a device.
 pub(crate) fn tensors(
     batch: Batch,
     side: usize,
@@ -85,7 +85,7 @@ pub(crate) fn tensors(
     Ok(tensors.collect::<Result<_, _>>()?)
 }
 
-/// What a network predicts of each sample, in order, from its evaluation images.
+/// Returns a network's predictions for all samples, in order, from their evaluation images.
 ///
 /// # Errors
 /// [`TrainError`] naming the image that cannot be used.
@@ -98,7 +98,7 @@ pub fn predict(
     predict_in_order(network, images, &Order::Once, batch_size, workers)
 }
 
-/// The same of the samples of an order that ends.
+/// The same as [`predict`], for the samples of a finite order.
 pub(super) fn predict_in_order(
     network: &QualityNetwork,
     images: &Arc<Images>,

@@ -1,4 +1,4 @@
-//! Weight files: safetensors and PyTorch's zip files in, safetensors out.
+//! Weight files: reads safetensors and PyTorch's zip files, writes safetensors.
 
 use std::collections::hash_map::Entry::{Occupied, Vacant};
 use std::collections::{BTreeMap, HashMap};
@@ -14,15 +14,16 @@ const FIRST: &str = "features.0.0.weight";
 const CLASSIFIER: [&str; 2] = ["classifier.1.weight", "classifier.1.bias"];
 
 impl EfficientNetB0 {
-    /// Takes weights of torchvision's or timm's `efficientnet_b0` from a `.safetensors` file or from a `.pth` or `.pt` file of torch 1.6 or later.
+    /// Reads weights of torchvision's or timm's `efficientnet_b0` from a `.safetensors` file or a `.pth` or `.pt` file of torch 1.6 or
+    /// later.
     ///
-    /// A first convolution of several channels becomes one of one channel as `first` says; a classifier with another number of outputs
-    /// is left as it is here. [`Loaded`] states both, and what else the file holds. timm's `tf_efficientnet_b0` bears the same names
-    /// but pads and normalises in another way: it is read without complaint and gives other outputs than in timm.
+    /// A first convolution of several channels is converted to one channel according to `first`; if the file's classifier has a different
+    /// number of outputs, the network keeps its own. [`Loaded`] reports both, and what else is in the file. timm's `tf_efficientnet_b0`
+    /// has the same names but a different padding and normalisation: it is read without an error and gives other outputs than in timm.
     ///
     /// # Errors
-    /// If the file cannot be read, or if any tensor is missing, has another shape or holds what is not a weight; each is named, and
-    /// the network is then as before.
+    /// If the file cannot be read, or if tensors are missing, have another shape or contain invalid weights; each is named, and the
+    /// network is then unchanged.
     pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
         let (loaded, tensors) = self.fit(read(path)?, first)?;
         let assigned = self.assign(&tensors);
@@ -30,7 +31,7 @@ impl EfficientNetB0 {
         Ok(loaded)
     }
 
-    /// The tensors of a file by torchvision's names, with the own values where the file has none to give.
+    /// Returns the tensors of a file by torchvision's names, with the network's own values where the file has none.
     pub(super) fn fit(
         &self,
         found: HashMap<String, Tensor>,
@@ -43,7 +44,7 @@ impl EfficientNetB0 {
         for (name, tensor) in all {
             match found.entry(without_prefix(&name).to_owned()) {
                 Vacant(place) => drop(place.insert((name, tensor))),
-                // The same tensor behind another prefix.
+                // The same tensor with another prefix.
                 Occupied(_) => loaded.unused.push(name),
             }
         }
@@ -86,7 +87,7 @@ impl EfficientNetB0 {
         loaded.unused.retain(|name| !counter(name));
         loaded.unused.sort();
         if loaded.fresh_classifier {
-            // A weight without its bias, or the other way round, is not a classifier.
+            // A weight without its bias, or the reverse, is not a classifier.
             for own in self
                 .parameters()?
                 .into_iter()
@@ -101,7 +102,7 @@ impl EfficientNetB0 {
         Ok((loaded, tensors))
     }
 
-    /// Writes all weights and running statistics as safetensors with torchvision's names, whole or not at all.
+    /// Writes all weights and running statistics atomically as safetensors with torchvision's names.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -111,7 +112,7 @@ impl EfficientNetB0 {
     }
 }
 
-/// Writes named tensors, whole or not at all.
+/// Writes named tensors atomically.
 pub(super) fn write(
     path: &Path,
     named: impl IntoIterator<Item = Named>,
@@ -123,8 +124,8 @@ pub(super) fn write(
     Ok(ppa_dataset::write_whole(path, &bytes)?)
 }
 
-/// Adds metadata to the header of a safetensors file, where the library would put it: it takes a hash map, whose order changes from run
-/// to run.
+/// Adds metadata to the header of a safetensors file, where the library would put it: the library takes a hash map, whose order varies
+/// between runs.
 fn with_metadata(file: Vec<u8>, entries: &BTreeMap<String, String>) -> Vec<u8> {
     if entries.is_empty() {
         return file;
@@ -140,7 +141,7 @@ fn with_metadata(file: Vec<u8>, entries: &BTreeMap<String, String>) -> Vec<u8> {
     [&length, &header[..], tensors].concat()
 }
 
-/// The tensors of a file, by the names that they have there.
+/// Reads the tensors of a file, by their names in it.
 pub(super) fn read(path: &Path) -> Result<HashMap<String, Tensor>, WeightsError> {
     read_any(path).map_err(|source| WeightsError::Read {
         path: path.to_owned(),
@@ -157,10 +158,10 @@ fn read_any(
             &Device::Cpu,
         )?),
         Some("pth" | "pt") => {
-            // The archive is opened by its path: what would block is refused before.
+            // The archive is opened by its path, so files that would block are refused first.
             drop(ppa_core::regular_file::open(path)?);
             let tensors = pickle::read_all(path)?;
-            // Training scripts put the weights beside other things.
+            // Training scripts store the weights next to other values.
             let tensors = if tensors.is_empty() {
                 pickle::read_all_with_key(path, Some("state_dict"))?
             } else {

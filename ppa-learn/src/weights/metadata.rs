@@ -1,4 +1,4 @@
-//! What users of a weight file must know besides its values.
+//! Metadata of weight files.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,24 +13,24 @@ const MIRROR: &str = "mirror";
 /// Key of the unit of corrections in safetensors and ONNX.
 const CORRECTION_UNIT: &str = "correction_unit_deg";
 
-/// What users of a weight file must know besides its values; in the metadata of safetensors and ONNX.
+/// Information that users of a weight file need in addition to its values, stored in the metadata of safetensors and ONNX.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct WeightsMetadata {
-    /// The network was trained with left limbs shown as right ones: images mirrored left to right, cameras exchanged. It must see
-    /// left limbs in the same way. Written as `mirror` = `true`, and not at all otherwise.
+    /// Whether the network was trained with left limbs shown as right ones: images mirrored left to right, cameras exchanged. It must
+    /// see left limbs in the same way. Written as `mirror` = `true`, and omitted if false.
     pub mirror: bool,
-    /// What the network predicts. Corrections are written as `correction_unit_deg` = `30`: degrees of one unit of the second output.
+    /// Targets of the network. Corrections are written as `correction_unit_deg` = `30`: degrees per unit of the second output.
     pub targets: Targets,
 }
 
 impl WeightsMetadata {
-    /// That of a network whose left limbs are shown as right ones, or not.
+    /// Makes the metadata of a network.
     pub fn new(mirror: bool, targets: Targets) -> Self {
         Self { mirror, targets }
     }
 
-    /// That of a weight file: nothing but in safetensors.
+    /// Reads the metadata of a weight file; the default for files other than safetensors.
     ///
     /// # Errors
     /// If the file cannot be read, or its corrections have another unit.
@@ -64,7 +64,7 @@ impl WeightsMetadata {
         })
     }
 
-    /// Names and values, sorted so that the same metadata are the same bytes.
+    /// Returns names and values, sorted so that the same metadata give the same bytes.
     pub(super) fn entries(self) -> BTreeMap<String, String> {
         let mirror = self.mirror.then(|| (MIRROR.to_owned(), "true".to_owned()));
         let unit = (self.targets == Targets::QualityAndCorrection)

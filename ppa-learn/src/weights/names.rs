@@ -1,9 +1,9 @@
 //! Names of the tensors in torchvision and in timm.
 
-/// timm's name of a tensor of its `efficientnet_b0`, from torchvision's.
+/// Returns timm's name of a tensor of its `efficientnet_b0`, given torchvision's.
 ///
-/// `tf_efficientnet_b0` of timm has the same names but another padding and another epsilon of its normalisations;
-/// no name distinguishes the two, and its weights do not give its outputs here.
+/// timm's `tf_efficientnet_b0` has the same names but another padding and another epsilon in its normalisations;
+/// no name distinguishes the two, and its weights do not reproduce its outputs here.
 pub fn timm_name(torchvision: &str) -> Option<String> {
     let (module, value) = torchvision.rsplit_once('.')?;
     let module = match module {
@@ -17,7 +17,7 @@ pub fn timm_name(torchvision: &str) -> Option<String> {
     Some(format!("{module}.{value}"))
 }
 
-/// `features.S.J.block.K...` to `blocks.S-1.J...`; the first stage has no expansion.
+/// Converts `features.S.J.block.K...` to `blocks.S-1.J...`; the first stage has no expansion.
 fn block_name(module: &str) -> Option<String> {
     let (place, inner) = module.strip_prefix("features.")?.split_once(".block.")?;
     let (stage, block) = place.split_once('.')?;
@@ -42,7 +42,7 @@ fn block_name(module: &str) -> Option<String> {
     Some(format!("blocks.{stage}.{block}.{inner}"))
 }
 
-/// A name without what wrappers put before it.
+/// Returns a name without the prefixes of wrappers.
 pub fn without_prefix(name: &str) -> &str {
     let mut name = name;
     while let Some(rest) = name

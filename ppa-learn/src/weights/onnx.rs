@@ -1,4 +1,4 @@
-//! Networks as ONNX models, for inference.
+//! Export of networks as ONNX models for inference.
 
 use std::path::Path;
 
@@ -9,15 +9,15 @@ use super::onnx_network::{Builder, Network};
 use super::{WeightsError, WeightsMetadata};
 use crate::network::{EfficientNetB0, LateFusion, QualityNetwork, Targets};
 
-/// The operators used are those of this version of ONNX's set, and of many before and after it.
+/// Version of ONNX's operator set; the operators used are the same in many versions before and after it.
 const OPERATOR_SET: i64 = 13;
-/// The file format that came with it.
+/// Version of the file format that belongs to it.
 const FORMAT: i64 = 7;
 /// Names of the images of both cameras.
 const CAMERAS: [&str; 2] = ["left", "right"];
 
 impl EfficientNetB0 {
-    /// Writes the network for inference as ONNX, whole or not at all: `images` [N, 1, H, W] in f32 to `quality` [N, 1].
+    /// Writes the network for inference atomically as ONNX: `images` [N, 1, H, W] in f32 to `quality` [N, 1].
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -31,9 +31,9 @@ impl EfficientNetB0 {
 }
 
 impl QualityNetwork {
-    /// Writes the network for inference as ONNX, whole or not at all: `images` [N, 1, H, W] in f32 to `quality` [N, 1]; of both
-    /// cameras `left` [N, 1, H, W] and `right` [N, 1, H', W'] to `quality` [N, 1]. A network that predicts corrections also gives
-    /// `correction_deg` [N, 1]. Weights that both cameras share are in it once.
+    /// Writes the network for inference atomically as ONNX: `images` [N, 1, H, W] in f32 to `quality` [N, 1]; for both cameras
+    /// `left` [N, 1, H, W] and `right` [N, 1, H', W'] to `quality` [N, 1]. A network that predicts corrections also has the output
+    /// `correction_deg` [N, 1]. Weights shared by both cameras are stored once.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -49,7 +49,7 @@ fn model(network: &QualityNetwork) -> Result<Model, WeightsError> {
     }
 }
 
-/// Names of a model's outputs.
+/// Returns the names of a model's outputs.
 fn names(targets: Targets) -> &'static [&'static str] {
     match targets {
         Targets::Quality => &["quality"],
@@ -98,7 +98,7 @@ fn both(network: &QualityNetwork) -> Result<Model, WeightsError> {
     Ok(finished(builder.graph, &CAMERAS, outputs))
 }
 
-/// The layers of late fusion, from the values of both cameras to the model's outputs.
+/// Adds the layers of late fusion, from the values of both cameras to the model's outputs.
 fn join(
     builder: &mut Builder,
     late: &LateFusion,
@@ -115,7 +115,7 @@ fn join(
     Ok(())
 }
 
-/// A model of a graph that leads from images to outputs.
+/// Makes a model from a graph that computes outputs from images.
 fn finished(graph: Graph, images: &[&str], outputs: &[&str]) -> Model {
     let images = images
         .iter()

@@ -140,13 +140,13 @@ pub struct Value {
 }
 
 impl Value {
-    /// A tensor of f32; sides without a number may have any.
+    /// Describes a tensor of f32; dimensions of `None` may have any size.
     pub fn of_floats(name: &str, shape: &[Option<i64>]) -> Self {
         let dim = shape.iter().enumerate().map(|(index, side)| match side {
             Some(side) => Dimension {
                 value: Some(dimension::Value::Fixed(*side)),
             },
-            // The first side is the number of images, the same in input and output.
+            // The first dimension is the number of images, the same in input and output.
             None if index == 0 => Dimension {
                 value: Some(dimension::Value::Named("N".into())),
             },
@@ -199,7 +199,7 @@ pub struct Dimension {
 
 /// The choice in a dimension.
 pub mod dimension {
-    /// One side of a tensor.
+    /// One dimension of a tensor.
     #[derive(Clone, PartialEq, prost::Oneof)]
     pub enum Value {
         /// dim_value

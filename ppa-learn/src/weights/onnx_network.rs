@@ -9,18 +9,18 @@ use crate::network::{
     LinearPlace, SqueezePlace, running,
 };
 
-/// A graph under construction, and the prefix of the names of what is added now.
+/// A graph under construction, and the prefixes for the names of added elements.
 #[derive(Default)]
 pub struct Builder {
     pub graph: Graph,
-    /// Before the names of nodes.
+    /// Prefix of the names of nodes.
     pub nodes: &'static str,
-    /// Before the names of weights, which nodes of several names can share.
+    /// Prefix of the names of weights, which nodes with different prefixes can share.
     pub weights: &'static str,
 }
 
 impl Builder {
-    /// Adds a node with one output, and gives the output's name.
+    /// Adds a node with one output and returns the output's name.
     pub fn node(
         &mut self,
         operator: &str,
@@ -39,7 +39,7 @@ impl Builder {
         output
     }
 
-    /// The name of a weight, which is added unless it is there.
+    /// Returns the name of a weight, which is added unless it exists.
     fn constant(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
         let name = format!("{}{name}", self.weights);
         let there = &mut self.graph.initializer;
@@ -49,7 +49,7 @@ impl Builder {
         name
     }
 
-    /// A layer of which every output depends on every input, from its weight [out, in] and its bias.
+    /// Adds a fully connected layer with weight [out, in] and bias.
     pub fn linear(
         &mut self,
         name: &str,
@@ -65,7 +65,7 @@ impl Builder {
         self.node("Gemm", &[x, &weight, &bias], out, transposed)
     }
 
-    /// The last layer, with one output [N, 1] for each name: the quality, then the correction in degrees.
+    /// Adds the last layer, with one output [N, 1] for each name: the quality, then the correction in degrees.
     pub fn targets(
         &mut self,
         name: &str,
@@ -88,12 +88,12 @@ impl Builder {
         rows.enumerate().map(target).collect()
     }
 
-    /// The mean of each channel.
+    /// Adds the mean of each channel.
     fn pooled(&mut self, x: &str, output: &str) -> String {
         self.node("GlobalAveragePool", &[x], output, vec![])
     }
 
-    /// x * sigmoid(x), under a name that follows from `x`'s.
+    /// Adds x * sigmoid(x), with a name derived from `x`'s.
     pub fn silu(&mut self, x: &str) -> String {
         let name = x.strip_prefix(self.nodes).unwrap_or(x).to_owned();
         let gate = self.node("Sigmoid", &[x], &format!("{name}.sigmoid"), vec![]);
@@ -120,7 +120,7 @@ impl<'a> Network<'a> {
         })
     }
 
-    /// Adds what leads from `images` to the features that the last layer sees, and gives their name.
+    /// Adds the backbone from `images` to the features, the input of the last layer, and returns their name.
     pub fn features(&self, builder: &mut Builder, images: &str) -> String {
         let mut nodes = Nodes {
             network: self,
@@ -130,7 +130,7 @@ impl<'a> Network<'a> {
         features
     }
 
-    /// Weight and bias of the last layer.
+    /// Returns weight and bias of the last layer.
     pub fn last_layer(&self) -> [&[f32]; 2] {
         [0, 1].map(|part| {
             let entry = &self.architecture.classifier[part];
@@ -139,7 +139,7 @@ impl<'a> Network<'a> {
     }
 }
 
-/// The nodes of a backbone; what goes from layer to layer are names of outputs.
+/// The nodes of a backbone; layers pass names of outputs to each other.
 struct Nodes<'a> {
     network: &'a Network<'a>,
     builder: &'a mut Builder,
@@ -198,7 +198,7 @@ impl Layers for Nodes<'_> {
 }
 
 impl Nodes<'_> {
-    /// A convolution whose weights and bias hold the normalisation after it.
+    /// Adds a convolution with the normalisation after it folded into weights and bias.
     fn conv(&mut self, name: &str, input: &str, place: &ConvPlace) -> String {
         let Network {
             parameters,
@@ -232,7 +232,7 @@ impl Nodes<'_> {
         builder.node("Conv", &input, &format!("{name}.out"), attributes)
     }
 
-    /// A layer of a squeeze-and-excitation, as a convolution of one pixel.
+    /// Adds a layer of a squeeze-and-excitation, as a convolution of one pixel.
     fn gate_layer(&mut self, name: &str, x: &str, place: &LinearPlace) -> String {
         let weight = &self.network.parameters[place.weight.clone()];
         let bias = &self.network.parameters[place.bias.clone()];

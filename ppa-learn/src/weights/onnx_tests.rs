@@ -1,5 +1,5 @@
-//! Models as any reader sees them: each node comes after those that it needs, normalisations are folded away, and evaluating the nodes with candle's
-//! own operations gives the outputs of the network.
+//! Tests of exported models: each node comes after those that it needs, normalisations are folded in, and evaluating the nodes with
+//! candle's own operations gives the outputs of the network.
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,8 +15,8 @@ use crate::network::{
 };
 use crate::random::{Purpose, stream};
 
-/// A network whose normalisations keep values of the size that they have, so that answers follow images; of both cameras if it
-/// fuses them.
+/// A network whose normalisations preserve the magnitude of values, so that predictions depend on the images; for both cameras if
+/// `fusion` is given.
 fn network(seed: u64, fusion: Option<Fusion>) -> QualityNetwork {
     network_of(Targets::Quality, seed, fusion)
 }
@@ -28,7 +28,7 @@ fn network_of(targets: Targets, seed: u64, fusion: Option<Fusion>) -> QualityNet
     let variances = tensors.keys().filter(|name| name.ends_with("running_var"));
     for variance in variances.cloned().collect::<Vec<_>>() {
         let weight = &tensors[&variance.replace(".1.running_var", ".0.weight")];
-        // About the mean square of what comes in, so that values neither fade nor grow.
+        // About the mean square of the inputs, so that values neither vanish nor grow.
         let squares = weight.sqr().and_then(|w| w.flatten_from(1)?.sum(1)? * 0.4);
         tensors.insert(variance, squares.unwrap());
     }
@@ -55,7 +55,7 @@ fn images(network: &QualityNetwork) -> Vec<Tensor> {
     (0..network.cameras()).map(image).collect()
 }
 
-/// The graph as it stands in a file.
+/// Writes the graph to a file and reads it back.
 fn written(network: &QualityNetwork) -> Graph {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.onnx");
@@ -79,7 +79,7 @@ fn number(node: &Node, name: &str) -> usize {
     (attribute.ints.first().unwrap_or(&attribute.i)).to_owned() as usize
 }
 
-/// What a node makes of its inputs.
+/// Evaluates a node.
 fn run(node: &Node, inputs: &[&Tensor]) -> candle_core::Result<Tensor> {
     match (node.op_type.as_str(), inputs) {
         ("Conv", [x, weight, bias]) if node.attribute.is_empty() => {
@@ -107,7 +107,7 @@ fn run(node: &Node, inputs: &[&Tensor]) -> candle_core::Result<Tensor> {
     }
 }
 
-/// What each output of a graph says of images, each node after those that it needs.
+/// Evaluates the outputs of a graph for images, checking that each node comes after those that it needs.
 fn evaluate(graph: &Graph, images: Vec<Tensor>) -> Vec<Tensor> {
     let weights = graph.initializer.iter().map(|weight| {
         let values = weight.raw_data.as_chunks().0.iter();
@@ -131,7 +131,7 @@ fn evaluate(graph: &Graph, images: Vec<Tensor>) -> Vec<Tensor> {
     outputs.map(|name| values[name].clone()).collect()
 }
 
-/// Checks a model, and gives its number of nodes and of values in weights.
+/// Checks a model, and returns its number of nodes and of values in weights.
 fn checked(network: &QualityNetwork, cameras: &[&str]) -> (usize, usize) {
     let graph = written(network);
     assert_eq!(names(&graph.input), cameras);
@@ -171,7 +171,7 @@ fn checked(network: &QualityNetwork, cameras: &[&str]) -> (usize, usize) {
     (graph.node.len(), values.sum())
 }
 
-/// Values of a single network: 4,008,253 parameters, of which 42,016 scale and shift normalisations; the shifts remain, as biases.
+/// Values of a single network: 4,008,253 parameters, of which 42,016 are scales and shifts of normalisations; the shifts remain, as biases.
 const ONE: usize = 4_008_253 - 42_016 / 2;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Values of networks of one camera or both, from files and to files.
+//! Reading and writing of the values of networks for one camera or both.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,10 +10,10 @@ use super::{FirstConvolution, Loaded, WeightsError, WeightsMetadata, assign, mis
 use crate::network::{CAMERA_PREFIXES, Fusion, FusionKind, LateFusion, Options, QualityNetwork};
 
 impl QualityNetwork {
-    /// Takes the values of every parameter and running statistic by name; other names are not looked at.
+    /// Sets every parameter and running statistic by name; other names are ignored.
     ///
     /// # Errors
-    /// If any is missing, has another shape or holds what is not a weight, each named; the network is then as before.
+    /// If tensors are missing, have another shape or contain invalid weights, naming each; the network is then unchanged.
     pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
         let (layout, statistics) = (self.layout(), self.statistics_layout());
         let mut variables = self.variables();
@@ -25,15 +25,15 @@ impl QualityNetwork {
         assign(&variables, entries.chain(statistics), tensors)
     }
 
-    /// The network that a weight file is of, with its weights; values of `seed` where the file has none to give. Metadata of
-    /// safetensors says whether it predicts corrections.
+    /// Makes the network that a weight file belongs to, with its weights, and with initial values of `seed` where the file has none.
+    /// Metadata of safetensors states whether it predicts corrections.
     ///
-    /// Names show which one: layers that fuse both cameras' values are those of late fusion, and networks of each camera are separate
-    /// ones. Score fusion with shared weights bears the names of a single network behind a wrapper's `module.`, and is taken for
-    /// that; only the configuration of its training knows.
+    /// The kind of network follows from the names: layers that fuse both cameras' values mean late fusion, and networks of each camera
+    /// mean separate weights. Score fusion with shared weights has the names of a single network with a wrapper's prefix `module.` and
+    /// is taken for one; only the training configuration distinguishes them.
     ///
     /// # Errors
-    /// As [`EfficientNetB0::load`](crate::EfficientNetB0::load).
+    /// The same as [`EfficientNetB0::load`](crate::EfficientNetB0::load).
     pub fn open(
         path: &Path,
         seed: u64,
@@ -56,16 +56,16 @@ impl QualityNetwork {
         Ok((network, loaded))
     }
 
-    /// Takes weights of a file as [`EfficientNetB0::load`](crate::EfficientNetB0::load) does. A file of one network fills the
-    /// networks of both cameras, as after pretraining on a unified view; layers that fuse both then stay as they are here.
+    /// Reads weights from a file as [`EfficientNetB0::load`](crate::EfficientNetB0::load) does. A file of one network fills the
+    /// networks of both cameras, as after pretraining on a unified view; layers that fuse both then stay unchanged.
     ///
     /// # Errors
-    /// As [`EfficientNetB0::load`](crate::EfficientNetB0::load); the network is then as before.
+    /// The same as [`EfficientNetB0::load`](crate::EfficientNetB0::load); the network is then unchanged.
     pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
         self.fill(read(path)?, path, first)
     }
 
-    /// Takes the tensors of the file `path`.
+    /// Sets the values to the tensors of the file `path`.
     fn fill(
         &self,
         mut found: HashMap<String, Tensor>,
@@ -95,7 +95,7 @@ impl QualityNetwork {
                 false => found.clone(),
             };
             let (of_branch, fitting) = branch.fit(of_branch, first)?;
-            // Both cameras' networks say the same of a file of one network.
+            // Both cameras' networks report the same for a file of one network.
             if by_camera || number == 0 {
                 let prefix = if by_camera { prefix } else { "" };
                 let whole = |name| format!("{prefix}{name}");
@@ -118,7 +118,7 @@ impl QualityNetwork {
         Ok(loaded)
     }
 
-    /// Writes all weights and running statistics as safetensors, whole or not at all.
+    /// Writes all weights and running statistics atomically as safetensors.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -127,13 +127,13 @@ impl QualityNetwork {
     }
 }
 
-/// Whether a tensor is of the left or of the right camera's network.
+/// Returns whether a tensor belongs to the left or the right camera's network.
 fn of_a_camera(name: &str) -> bool {
     let mut prefixes = CAMERA_PREFIXES.iter();
     prefixes.any(|prefix| name.starts_with(prefix))
 }
 
-/// Takes out the tensors of the network whose names begin with `prefix`, by the names that they have in it.
+/// Extracts the tensors whose names begin with `prefix`, by their names without it.
 fn of_network(found: &mut HashMap<String, Tensor>, prefix: &str) -> HashMap<String, Tensor> {
     let own = found.extract_if(|name, _| name.starts_with(prefix));
     own.map(|(name, tensor)| (name[prefix.len()..].to_owned(), tensor))

@@ -1,7 +1,7 @@
-//! The deterministic halves of the augmentations against OpenCV 4.8.1 and albumentations 1.3.1.
+//! The deterministic parts of the augmentations against OpenCV 4.8.1 and albumentations 1.3.1.
 //!
-//! `augmentation.json` was made by `scripts/make_augmentation_reference.py`; images are given by a formula, so that the
-//! file holds results only: all pixels of a small image, and for the paper's size sums with uneven weights.
+//! `augmentation.json` was made by `scripts/make_augmentation_reference.py`; images are given by a formula, so the
+//! file contains only results: all pixels of a small image, and weighted sums for the paper's size.
 
 use ppa_learn::data::{RANGE_MM, Raster, box_blur, gradient, quantile, rotate};
 use serde_json::Value;
@@ -37,7 +37,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     numbers.map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// The sum of a large image within 10⁻⁷ of it (f32 rounding averages out), each pixel of a small one within 10⁻⁶.
+/// Compares the sum of a large image to a relative 10⁻⁷ (f32 rounding averages out), and each pixel of a small one to 10⁻⁶.
 fn compare<T: Copy>(expected: &Value, small: &Raster<T>, large: &Raster<T>)
 where
     f64: From<T>,

@@ -1,4 +1,4 @@
-//! Intervals of predictions and refusal of unlike frames, from calibration with persons who were not trained with.
+//! Prediction intervals and refusal of unlike frames, calibrated with persons who were not in the training data.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::toy::{IMAGE, dataset, png};
 /// Depth of a pixel, in mm.
 type Depth = fn(u32, u32) -> u16;
 
-/// Bars at sixteen angles of thirteen persons, and a network of both views of five of them.
+/// Bars at sixteen angles for thirteen persons, and a network trained on both views of five of them.
 fn trained() -> (TempDir, TempDir) {
     let steps: Vec<u32> = (0..=180).step_by(12).collect();
     let data = dataset(13, &steps);
@@ -96,7 +96,7 @@ fn intervals_cover_a_new_person_and_odd_frames_are_refused() {
         }
     }
     println!("{judged} judged, {covered} covered");
-    // The person is like those of calibration.
+    // The person is like the calibration persons.
     assert!(judged >= 14 && covered >= 12, "{judged}, {covered}");
 
     let usual = person.join("depth_cam_left_48.0.png");

@@ -1,4 +1,4 @@
-//! Experiments on toy data, carried out by shards and gathered into tables.
+//! Experiments on toy data, run in shards and collected into tables.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::toy::dataset;
 
-/// A plan of a few small steps: synthetic images of four persons, preparations of two.
+/// A plan with a few small steps: synthetic images of four persons, preparations of two.
 fn plan(folder: &Path, synthetic: &TempDir, preparations: &TempDir, steps: u64) -> ExperimentPlan {
     let [synthetic, preparations] = [synthetic, preparations].map(|folder| folder.path().display());
     let text = format!(
@@ -25,7 +25,7 @@ fn plan(folder: &Path, synthetic: &TempDir, preparations: &TempDir, steps: u64) 
     ExperimentPlan::read(&path).unwrap()
 }
 
-/// Gives the feet of a dataset the other body shapes as well, with the images of `orig`.
+/// Adds the other body shapes to a dataset, with the images of `orig`.
 fn add_shapes(folder: &TempDir) {
     for patient in fs::read_dir(folder.path()).unwrap() {
         let depth = patient.unwrap().path().join("depth/r");
@@ -91,7 +91,7 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
         );
         assert!(finished.unwrap());
     }
-    // Twelve runs, and the pretrainings of both views, of the left and of the right one, each once.
+    // Twelve runs, and one pretraining run each for both views, the left and the right one.
     assert_eq!(begun.len(), 12 + 3, "{begun:?}");
     let again = runner.run(|_| true, &go(), |_| panic!("all is finished"));
     assert!(again.unwrap());
@@ -113,7 +113,7 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
         table.contains("\n\nfrom scratch: The network's MAE, "),
         "{table}"
     );
-    // Read from the files of the first time.
+    // Read from the files written the first time.
     let first = results.comparisons();
     let mut results = runner.results().unwrap();
     runner.add_baselines(&mut results).unwrap();
@@ -234,7 +234,7 @@ fn learning_curves_have_a_column_for_each_amount() {
 #[test]
 fn shapes_and_ablations_test_networks_of_experiment_1() {
     let data = dataset(4, &[0, 90, 180]);
-    // With the images of the scan's skin: altered shapes have the errors of experiment 1.
+    // All shapes have the images of the scan's skin, so altered shapes have the errors of experiment 1.
     add_shapes(&data);
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path(), &data, &data, 2);
@@ -249,7 +249,7 @@ fn shapes_and_ablations_test_networks_of_experiment_1() {
         runner.add_baselines(&mut results).unwrap();
         (results, steps - before)
     };
-    // Two networks of each view without variants of the skin, and as many of sides that are not mirrored.
+    // Two networks of each view without variants of the skin, and the same number for limbs that are not mirrored.
     let (ablations, steps) = results_of(Experiment::Ablations);
     assert_eq!(steps, 2 * 2 * 2 * 2);
     // The networks with variants of the skin, three columns.
@@ -323,7 +323,7 @@ fn nobody_is_tested_whose_images_were_pretrained_with() {
     let data = dataset(4, &[0, 90, 180]);
     add_shapes(&data);
     let folder = tempfile::tempdir().unwrap();
-    // The synthetic images stand for the preparations as well.
+    // The synthetic images also serve as preparations.
     let plan = plan(folder.path(), &data, &data, 3);
     let runner = Runner::new(&plan, Experiment::TwoA, folder.path()).unwrap();
     let pretrained = runner.runs().iter().position(|run| run.needs().is_some());

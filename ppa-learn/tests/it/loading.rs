@@ -66,7 +66,7 @@ fn listed_samples_are_loaded_as_evaluation_sees_them() {
     let samples: Vec<_> = listed.iter().map(|batch| batch.samples.clone()).collect();
     assert_eq!(samples, [vec![4, 1], vec![5]]);
     assert_eq!(listed[1].images[0], all[2].images[0][SIDE * SIDE..]);
-    // Drawn as in training, without its augmentation.
+    // Drawn as in training, but without augmentation.
     let training = training(&images, 0);
     let Order::Training { balanced, seed, .. } = &training else {
         panic!("an order of training")
@@ -305,7 +305,7 @@ fn persons_are_known_again_however_the_dataset_is_spelled() {
     assert!(ppa_learn::data::check_split(&one, &other).is_err());
 }
 
-/// Mirror images of right limbs before mirrored cameras, as left limbs, are the same samples.
+/// Mirror images of right limbs in front of mirrored cameras, stored as left limbs, are the same samples.
 #[test]
 fn mirrored_left_limbs_give_the_samples_of_right_ones() {
     let right = dataset(2, &[0, 90, 180]);
@@ -352,7 +352,7 @@ fn mirrored_left_limbs_give_the_samples_of_right_ones() {
         assert!(inputs(&left, true) == expected, "{views}");
         assert!(inputs(&left, false) != expected, "{views}");
     }
-    // Of one camera alone, left limbs cannot be shown as right ones.
+    // With only one camera, left limbs cannot be shown as right ones.
     let selection = Selection {
         mirror: true,
         ..Selection::all(Views::Left)

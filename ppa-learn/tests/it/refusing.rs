@@ -1,4 +1,4 @@
-//! Trainings that cannot be: refused before anything is written, or stopped where they cannot continue.
+//! Invalid training runs: refused before anything is written, or stopped when they cannot continue.
 
 use std::fs;
 

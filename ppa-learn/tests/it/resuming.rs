@@ -1,4 +1,4 @@
-//! Trainings that continue where they were stopped, failed or were killed.
+//! Training runs that resume after they were stopped, failed or were killed.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
     let [whole, parts] = folders.each_ref().map(|folder| folder.path().join("run"));
     let config = config(data.path());
     assert_eq!(run(&config, &whole).unwrap(), Ended::Finished);
-    // Stopped beside and at a checkpoint; other workers and memory make no difference.
+    // Stopped between checkpoints and at one; other workers and memory make no difference.
     assert_eq!(stop_after(&config, &parts, 3), Ended::Stopped { step: 3 });
     assert!(!parts.join("weights.safetensors").exists());
     let other = TrainConfig {
@@ -26,7 +26,7 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
         ..config.clone()
     };
     assert_eq!(stop_after(&other, &parts, 4), Ended::Stopped { step: 4 });
-    // What a crash leaves behind the checkpoint: rows of steps to be made again, and half a line.
+    // Log entries of a crash after the checkpoint: rows of steps to be repeated, and half a line.
     let log = parts.join("log.jsonl");
     let mut text = fs::read_to_string(&log).unwrap();
     text += "{\"step\":5,\"seconds\":1.0,\"training/loss\":0.0}\n{\"step\":6,\"sec";
@@ -45,7 +45,7 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
     // Six steps and three evaluations.
     assert_eq!(scalars(&whole).len(), 6 + 3);
     assert_eq!(scalars(&whole), scalars(&parts));
-    // A finished training stays as it is.
+    // A finished training run stays unchanged.
     assert_eq!(run(&config, &parts).unwrap(), Ended::Finished);
 }
 
@@ -61,7 +61,7 @@ fn averages_and_statistics_are_the_same_after_a_stop() {
         ..plain.clone()
     };
     run(&averaged, whole).unwrap();
-    // Evaluations change nothing either.
+    // Evaluations do not change the weights either.
     let rarely = TrainConfig {
         checkpoint_every: n(5),
         evaluation: Vec::new(),
@@ -76,7 +76,7 @@ fn averages_and_statistics_are_the_same_after_a_stop() {
     let weights = |folder: &Path| fs::read(folder.join("weights.safetensors")).unwrap();
     assert!(weights(whole) == weights(parts));
     assert!(weights(whole) == weights(elsewhere.path()));
-    // Training itself does not notice: the losses are those without an average.
+    // Training itself is not affected: the losses are those without an average.
     let other = tempfile::tempdir().unwrap();
     run(&plain, other.path()).unwrap();
     assert!(weights(whole) != weights(other.path()));
@@ -133,7 +133,7 @@ fn a_training_resumes_with_the_data_it_began_with_only() {
     assert_eq!(run(&config, folder.path()).unwrap(), Ended::Finished);
 }
 
-/// The first step of a training that continues after an image, damaged behind its first step, had ended it and was repaired.
+/// First step of a training run that resumes after an image, damaged after the first step, stopped it and was repaired.
 fn first_step_after(config: &TrainConfig, folder: &Path, image: &Path) -> u64 {
     let whole = fs::read(image).unwrap();
     let damage = |_: &ppa_learn::train::Progress| fs::write(image, "no image").unwrap();
@@ -162,11 +162,11 @@ fn an_image_that_cannot_be_used_costs_no_steps() {
         keep_mb: 0,
         ..config(data.path())
     };
-    // Of the evaluation, after two steps.
+    // An evaluation image, after two steps.
     let folder = tempfile::tempdir().unwrap();
     let step = first_step_after(&config, folder.path(), &image(1));
     assert_eq!(step, 3);
-    // Of the training, whose next batches are loaded before.
+    // A training image; the next batches were already loaded.
     let folder = tempfile::tempdir().unwrap();
     let config = TrainConfig {
         checkpoint_every: n(1000),

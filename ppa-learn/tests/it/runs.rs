@@ -1,4 +1,4 @@
-//! Small trainings on toy data.
+//! Small training runs on toy data.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -48,7 +48,7 @@ pub fn stop_after(config: &TrainConfig, folder: &Path, step: u64) -> Ended {
     train(config, folder, &stop, report).unwrap()
 }
 
-/// A training in which nothing but the place of crops is random.
+/// A configuration in which only the position of crops is random.
 pub fn by_heart(data: &Path) -> TrainConfig {
     TrainConfig {
         steps: 160,
@@ -65,7 +65,7 @@ pub fn by_heart(data: &Path) -> TrainConfig {
     }
 }
 
-/// Both cameras' images, to be learned without dropout.
+/// A configuration for both cameras' images, to be learned without dropout.
 pub fn pairs(data: &Path, kind: FusionKind, shared_weights: bool) -> TrainConfig {
     TrainConfig {
         views: Views::Pairs,

@@ -1,4 +1,4 @@
-//! A dataset of bars that lie at an angle, made by a formula.
+//! A dataset of rotated bars, made by a formula.
 
 use std::fs;
 use std::path::Path;
@@ -16,8 +16,8 @@ pub fn png(path: &Path, side: u32, value: impl Fn(u32, u32) -> u16) {
         .unwrap();
 }
 
-/// Depth of a bar 500 mm before a wall, turned by the angle about the centre of the region; every person's bar has its own
-/// width and place.
+/// Depth of a bar 500 mm in front of a wall, rotated by the angle about the centre of the region; every person's bar has its own
+/// width and position.
 fn bar(x: u32, y: u32, angle_deg: f64, patient: u32) -> u16 {
     let shift = f64::from(patient % 3) - 1.0;
     let (x, y) = (f64::from(x) - 34.0 - shift, f64::from(y) - 29.0 + shift);
@@ -30,7 +30,7 @@ fn bar(x: u32, y: u32, angle_deg: f64, patient: u32) -> u16 {
     }
 }
 
-/// Right feet of some persons in the synthetic layout, poses at some steps, with labels from 1 (0 degrees) to 3 (90).
+/// Right feet of persons in the synthetic layout, with poses at the given steps and labels from 1 (0 degrees) to 3 (90).
 pub fn dataset(patients: u32, steps: &[u32]) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     for patient in 0..patients {

@@ -1,4 +1,4 @@
-//! Trainings on toy data learn, and show what they began with and what they measured.
+//! Training runs on toy data: learning, initial values and measurements.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 use crate::runs::{by_heart, config, n, pairs, run, source, stop_after};
 use crate::toy::dataset;
 
-/// The median of the last five losses that were logged; single batches scatter, as crops stay random.
+/// Median of the last five logged losses; single batches fluctuate because crops stay random.
 fn last_loss(folder: &Path) -> f64 {
     let log = read_log(&folder.join("log.jsonl")).unwrap();
     let losses: Vec<f64> = log.iter().map(|row| row.scalars["training/loss"]).collect();
@@ -32,12 +32,12 @@ fn one_batch_can_be_learned_by_heart() {
     let data = dataset(1, &[0, 60, 120, 180]);
     let folder = tempfile::tempdir().unwrap();
     run(&by_heart(data.path()), folder.path()).unwrap();
-    // Labels spread by 0.55 about their mean, which a constant loses at best.
+    // The variance of the labels is 0.55, the lowest loss of a constant.
     assert!(last_loss(folder.path()) < 0.1);
 }
 
-/// Images of 32 pixels are one pixel to the last blocks: batches of four pairs, some of them drawn twice, would be normalised there by
-/// too few values for a pair to have one answer.
+/// Images of 32 pixels are one pixel in the last blocks: batches of four pairs, some of them drawn twice, would be normalised there by
+/// too few values for a pair to have a unique prediction.
 #[test]
 #[ignore = "four trainings, a minute of processor time"]
 fn each_fusion_learns_four_pairs_by_heart() {
@@ -54,12 +54,12 @@ fn each_fusion_learns_four_pairs_by_heart() {
                 ..pairs(data.path(), kind, shared_weights)
             };
             run(&config, folder.path()).unwrap();
-            // A constant loses 0.55 at best; a step in three goes without one of the cameras.
+            // The lowest loss of a constant is 0.55; a third of the steps are without one of the cameras.
             let loss = last_loss(folder.path());
             let [labels, answers] = answers(folder.path(), &config.training);
             println!("{kind:?}, shared {shared_weights}: {loss}, {answers:?}");
             assert!(loss < 0.1, "{loss}");
-            // Labels lie two thirds apart.
+            // Labels are two thirds apart.
             let errors = labels.iter().zip(&answers).map(|(x, y)| (x - y).abs());
             assert!(errors.sum::<f64>() / 4.0 < 1.0 / 3.0, "{answers:?}");
             assert!(answers.is_sorted(), "{answers:?}");
@@ -67,7 +67,7 @@ fn each_fusion_learns_four_pairs_by_heart() {
     }
 }
 
-/// Labels of some persons, and the answers of a finished training to them.
+/// Labels of persons, and the predictions of a finished training run for them.
 fn answers(folder: &Path, persons: &[Source]) -> [Vec<f64>; 2] {
     let (config, network) = trained(folder).unwrap();
     let samples = samples(&config, persons).unwrap();
@@ -102,13 +102,13 @@ fn probing_takes_less_than_a_tenth_of_the_time_of_training() {
     assert!(10.0 * last < all, "{all} s, probing {last} s");
 }
 
-/// Bars at sixteen angles of six persons.
+/// Bars at sixteen angles for six persons.
 fn bars_of_six() -> TempDir {
     let steps: Vec<u32> = (0..=180).step_by(12).collect();
     dataset(6, &steps)
 }
 
-/// Five persons to learn from and one to judge by: a constant 2 is wrong by 0.53 on average.
+/// Five persons for training and one for evaluation: the mean absolute error of a constant 2 is 0.53.
 fn of_bars(data: &Path, config: TrainConfig) -> TrainConfig {
     TrainConfig {
         training: source(data, &[0, 1, 2, 3, 5]),
@@ -142,8 +142,8 @@ fn the_angle_of_a_bar_is_learned_from_other_bars() {
     assert!(mae < 0.45, "{mae}");
 }
 
-/// Mean absolute error on the bar of a sixth person, and the spread of the answers as a share of that of the labels, after 40 of
-/// the steps of `standard`, shortened and at a rate that is high at once.
+/// Mean absolute error on the bar of a sixth person, and the spread of the predictions as a share of that of the labels, after 40
+/// steps of `standard`, shortened and with a short warm-up of the rate.
 fn early(seed: u64, statistics: impl FnOnce(TrainConfig) -> TrainConfig) -> (f64, f64) {
     let folder = tempfile::tempdir().unwrap();
     let data = bars_of_six();
@@ -181,7 +181,7 @@ fn early_answers_spread_with_recomputed_statistics() {
     assert!(sum / 3.0 < 0.45, "{}", sum / 3.0);
 }
 
-/// Why statistics are computed again: those that training moves by a tenth in each step lag behind its weights.
+/// Shows why statistics are recomputed: those that training updates by a tenth in each step lag behind its weights.
 #[test]
 fn early_answers_are_nearly_constant_with_lagging_ones() {
     let (mae, spread) = early(1, |standard| TrainConfig {
@@ -193,8 +193,8 @@ fn early_answers_are_nearly_constant_with_lagging_ones() {
     assert!(mae > 0.5 && spread < 0.1, "{mae}, {spread}");
 }
 
-/// The best angle of every bar is the centre of 0 to 90 degrees weighted by 3 - label, about 30: a constant correction is wrong by 22.5
-/// on average.
+/// The best angle of every bar is the centre of 0 to 90 degrees weighted by 3 - label, about 30: the mean absolute error of a constant
+/// correction is 22.5.
 #[test]
 fn corrections_of_bars_are_learned_and_kept() {
     let folder = tempfile::tempdir().unwrap();
@@ -264,7 +264,7 @@ fn an_evaluation_logs_correlation_and_gap() {
     for scalars in evaluated {
         let gap = scalars["evaluation/mae"] - scalars["training/mae"];
         assert!((scalars["evaluation/gap"] - gap).abs() < 1e-12);
-        // Three labels: the correlations of their orders are multiples of a half.
+        // Three labels: the rank correlations are multiples of a half.
         let r_s = scalars["evaluation/r_s"];
         assert!(
             r_s.is_nan() || r_s.abs() <= 1.0 && (2.0 * r_s).fract() == 0.0,

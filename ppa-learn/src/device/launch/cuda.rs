@@ -1,4 +1,4 @@
-//! Kernels on NVIDIA devices, compiled for the device when the first one runs.
+//! Kernels on NVIDIA devices, compiled when the first one runs.
 #![allow(unsafe_code)]
 
 use std::sync::OnceLock;
@@ -11,14 +11,14 @@ use candle_core::{CudaStorage, Device, Error, Result};
 
 use super::{Given, KERNELS, Launch};
 
-/// Threads of a block.
+/// Number of threads per block.
 const BLOCK: u32 = 256;
 
-/// A device with one stream for all threads, since the networks of two cameras run on two threads: with `Device::new_cuda` each thread would have a
-/// stream of its own, and none would wait for what another is still computing.
+/// Opens a device with one stream for all threads, because the networks of two cameras run on two threads: with `Device::new_cuda` each
+/// thread would have its own stream, and none would wait for the results of another.
 pub fn open(number: usize) -> Result<Device> {
     let device = Device::new_cuda_with_stream(number)?;
-    // SAFETY: events order the work of several streams, and this device has one. To record them costs as much as a launch.
+    // SAFETY: events order the work of several streams, and this device has one. Recording them costs as much as a launch.
     unsafe { device.as_cuda_device()?.disable_event_tracking() };
     Ok(device)
 }
@@ -55,7 +55,7 @@ pub fn run(launch: &Launch, given: &Given<CudaStorage>) -> Result<CudaStorage> {
     Ok(CudaStorage::wrap_cuda_slice(out, device))
 }
 
-/// The kernels for the driver.
+/// Returns the compiled kernels.
 fn ptx() -> Result<&'static str> {
     static PTX: OnceLock<std::result::Result<String, String>> = OnceLock::new();
     let compile = || match compile_ptx(KERNELS) {

@@ -1,4 +1,4 @@
-//! The kernels as plain C on the CPU, thread after thread, with every access to memory checked where the compiler can.
+//! Emulation of the kernels as plain C on the CPU, one thread after the other, with memory accesses checked if the compiler supports it.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -9,8 +9,8 @@ use candle_core::{CpuStorage, Result};
 
 use super::{Given, KERNELS, Launch};
 
-/// A program that runs one kernel after the other: what it reads is the number of a kernel, the length of the output, the
-/// inputs, each behind its length, the integers and the floats; what it writes is the output.
+/// Program that runs one kernel after the other. It reads the number of a kernel, the length of the output, the inputs, each after
+/// its length, the integers and the floats; it writes the output.
 static EMULATOR: LazyLock<Mutex<Child>> = LazyLock::new(|| Mutex::new(start()));
 
 const BEFORE: &str = "
@@ -23,7 +23,7 @@ static int number;
 #define THREAD number
 ";
 
-/// CASES read what a kernel takes and call it by every thread of whole blocks, as on a device.
+/// CASES read the arguments of a kernel and call it for every thread of whole blocks, as on a device.
 const AFTER: &str = "
 static void take(void *values, size_t length) {
     if (fread(values, 4, length, stdin) != length) exit(0);
@@ -133,7 +133,7 @@ fn start() -> Child {
         command.arg(&source).args(checks).arg("-lm");
         command.output().expect("cc, which Rust links with")
     };
-    // Not every compiler comes with the libraries of its checks.
+    // Not every compiler has the sanitizer libraries.
     let checked = compile(&["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]);
     if !checked.status.success() {
         let plain = compile(&[]);

@@ -1,4 +1,4 @@
-//! Stand-in for devices that the program was built without.
+//! Replacement for devices without which the program was built.
 
 use candle_core::{Error, Result};
 

@@ -1,4 +1,4 @@
-//! Columns of a table compared with baselines, person by person.
+//! Comparison of the columns of a table with baselines, person by person.
 
 use std::fmt;
 
@@ -9,23 +9,23 @@ use crate::evaluate::{BaselineKind, Compared, Verdict, p_network_better, sentenc
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metric::Metric;
 
-/// A column beside predictions without a network.
+/// Comparison of a column with the baselines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The column, by its headings.
+    /// Headings of the column.
     pub column: String,
     /// Its mean absolute error.
     pub network_mae: f64,
-    /// The baselines, and persons' errors compared: each the mean over the column's seeds.
+    /// The baselines. Persons' errors are means over the column's seeds.
     pub baselines: Vec<Compared>,
-    /// Persons of all folds; one that several folds test counts once.
+    /// Number of persons of all folds; a person tested in several folds counts once.
     pub persons: usize,
     /// Whether the network is better.
     pub verdict: Verdict,
 }
 
 impl fmt::Display for Comparison {
-    /// The verdict in a sentence or two.
+    /// Writes the verdict in one or two sentences.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sentence = sentence(self.network_mae, &self.baselines, self.persons);
         write!(f, "{}: {sentence}", self.column)
@@ -33,7 +33,7 @@ impl fmt::Display for Comparison {
 }
 
 impl Results {
-    /// Each column of which a seed is complete beside the baselines, if there are any.
+    /// Compares each column that has a complete seed with the baselines, if there are any.
     pub fn comparisons(&self) -> Vec<Comparison> {
         let kinds = self.baselines();
         let columns = self.columns.iter().filter(|_| !kinds.is_empty());
@@ -75,7 +75,7 @@ mod tests {
     fn columns_are_compared_with_baselines_by_person() {
         let columns = Experiment::TwoC.configurations();
         let mut results = Results::new(Experiment::TwoC, columns, 2, &[1, 2]);
-        // Errors of 0.25 and 0.5 with the two seeds, of persons 1 and 2 in the two folds.
+        // Errors of 0.25 and 0.5 for the two seeds, of persons 1 and 2 in the two folds.
         for place in results.missing() {
             let error = 0.25 * place.seed as f64;
             results
@@ -102,7 +102,7 @@ mod tests {
         let [constant] = found.baselines[..] else {
             panic!("{found:?}")
         };
-        // 0.5 and 0.75 against 0.375 of both: the least of the four sign patterns.
+        // 0.5 and 0.75 against 0.375 for both: the most extreme of the four sign patterns.
         assert_eq!((constant.mae, constant.p_network_better), (0.625, 0.25));
         assert_eq!(found.verdict, Verdict::NotShown);
     }

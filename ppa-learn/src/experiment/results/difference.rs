@@ -1,4 +1,4 @@
-//! Columns of a table compared with its first one, person by person.
+//! Comparison of the columns of a table with its first one, person by person.
 
 use std::fmt;
 
@@ -9,18 +9,18 @@ use super::Results;
 use crate::evaluate::test_of_persons;
 use crate::experiment::configuration::{Configuration, Experiment};
 
-/// How much larger the mean absolute error of a column is than that of the table's first one.
+/// Difference between the mean absolute errors of a column and of the table's first column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
-    /// The column, by its headings.
+    /// Headings of the column.
     pub column: String,
-    /// The first column.
+    /// Headings of the first column.
     pub reference: String,
     /// Mean over the persons of the column's mean absolute error minus the first column's, over the seeds that both have.
     pub mae_difference: f64,
-    /// Exact two-sided sign-flip test over the persons.
+    /// p-value of an exact two-sided sign-flip test over the persons.
     pub p_two_sided: f64,
-    /// Persons of all folds.
+    /// Number of persons of all folds.
     pub persons: usize,
 }
 
@@ -46,8 +46,8 @@ impl fmt::Display for Difference {
 }
 
 impl Results {
-    /// Each column beside the first one, in experiments that alter one thing at a time: 1, body shapes and ablations. Columns without a
-    /// complete seed in common with the first are left out.
+    /// Compares each column with the first one, in experiments that change one thing at a time: 1, body shapes and ablations. Columns
+    /// without a complete seed in common with the first are left out.
     pub fn differences(&self) -> Vec<Difference> {
         use Experiment::{Ablations, One, Shapes};
         let alters = matches!(self.experiment, One | Shapes | Ablations);

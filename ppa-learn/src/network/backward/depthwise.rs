@@ -1,4 +1,4 @@
-//! Through the depthwise convolution.
+//! Backward pass through the depthwise convolution.
 
 use rayon::prelude::*;
 
@@ -13,8 +13,8 @@ use crate::kernels::depthwise_backward::{InputRow, add_weight_gradient};
 use crate::kernels::gradient::{ActivationGradient, Linear};
 
 impl Backward<'_> {
-    /// Through the depthwise convolution: the gradient of the expansion's activation input, and how that of the
-    /// expansion follows from it.
+    /// Backward pass through the depthwise convolution: returns the gradient of the expansion's activation input, and the
+    /// linear map from it to the gradient of the expansion.
     pub(super) fn depthwise(
         &mut self,
         block: &Block,
@@ -36,7 +36,7 @@ impl Backward<'_> {
             .map(|(task, of_expanded)| {
                 let mut of_weights = vec![0.0; weights.len()];
                 let mut sums = vec![0.0; 2 * channels];
-                // Rows of the input live until their gradient is known, a stride after the kernel has passed.
+                // Input rows are kept until their gradient is known, a stride after the kernel has passed.
                 let count = kernel + stride;
                 let rows = |count, size: Size, padding| {
                     Rows::new(self.pool, count, size.height, size.width, padding, channels)
@@ -86,7 +86,7 @@ impl Backward<'_> {
                             channels,
                             &mut of_weights,
                         );
-                        // Input row r takes from output rows up to (r + padding) / stride.
+                        // Input row r receives from output rows up to (r + padding) / stride.
                         let done = if y + 1 == size_out.height {
                             size.height
                         } else {
@@ -125,7 +125,7 @@ impl Backward<'_> {
     }
 }
 
-/// Rows of the gradient of the output that input row `y` contributed to, each with its row of the kernel.
+/// Returns the rows of the output's gradient to which input row `y` contributed, each with its row of the kernel.
 fn rows_from(
     y: usize,
     kernel: usize,

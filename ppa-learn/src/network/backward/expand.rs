@@ -1,4 +1,4 @@
-//! Through the first convolution of a block.
+//! Backward pass through the first convolution of a block.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use crate::kernels::matrix::{Matrix, Store, multiply};
 use crate::kernels::stem;
 
 impl Backward<'_> {
-    /// Through the expansion: `gradient`, which is that of the block's output, becomes that of its input.
+    /// Backward pass through the expansion: replaces `gradient` of the block's output by that of its input.
     pub(super) fn expand(
         &mut self,
         block: &Block,
@@ -25,7 +25,7 @@ impl Backward<'_> {
         let (place, size) = (&block.expand, tape.expand.size);
         let (channels, columns) = (place.channels, place.inputs);
         let weight = &self.parameters[place.weight.clone()];
-        // With a residual the input's gradient is the output's and what the branch adds.
+        // With a residual, the input's gradient is the sum of the output's and the branch's.
         let store = if block.residual {
             Store::Add
         } else {
@@ -67,7 +67,7 @@ impl Backward<'_> {
         self.gradients[place.weight.clone()].copy_from_slice(&of_weight);
     }
 
-    /// The gradient of the first convolution's weights.
+    /// Computes the gradient of the first convolution's weights.
     pub(super) fn stem(
         &mut self,
         block: &Block,

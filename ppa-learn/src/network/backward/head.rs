@@ -1,4 +1,4 @@
-//! Through pooling and the last convolution.
+//! Backward pass through pooling and the last convolution.
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ use crate::kernels::gradient::{ActivationGradient, ActivationSums};
 use crate::kernels::matrix::{Matrix, Store, multiply};
 
 impl Backward<'_> {
-    /// The gradient of the last block's output.
+    /// Returns the gradient of the last block's output.
     pub(super) fn head(&mut self, input: &[f32], head: &Normed, of_features: &[f32]) -> Buffer {
         let (place, size) = (&self.architecture.head, head.size);
         let (channels, columns) = (place.channels, place.inputs);

@@ -1,4 +1,4 @@
-//! Through residual, projection and squeeze-and-excitation.
+//! Backward pass through residual, projection and squeeze-and-excitation.
 
 use rayon::prelude::*;
 
@@ -11,8 +11,8 @@ use crate::kernels::gradient::{ActivationSums, add_gradient_sums, combine};
 use crate::kernels::matrix::{Matrix, Store, multiply};
 
 impl Backward<'_> {
-    /// Through residual, projection and squeeze-and-excitation: the gradient of the gated activation, and how that of
-    /// the depthwise convolution follows from it.
+    /// Backward pass through residual, projection and squeeze-and-excitation: returns the terms of the gradient of the depthwise
+    /// convolution, and the gradient of the gated activation.
     pub(super) fn project(
         &mut self,
         block: &Block,

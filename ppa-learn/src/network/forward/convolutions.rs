@@ -11,7 +11,7 @@ use crate::kernels::matrix::{Matrix, Store, multiply};
 use crate::kernels::stem;
 
 impl Forward<'_> {
-    /// What moments are taken about.
+    /// Returns the centre about which moments are taken.
     fn center(&self, place: &ConvPlace) -> &[f32] {
         &self.statistics[place.norm.mean.clone()]
     }

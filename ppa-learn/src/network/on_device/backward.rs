@@ -8,14 +8,14 @@ use super::forward::{BlockTape, Tape};
 use super::normalise::{Gradient, Normed};
 use super::parameters::{Gradients, Parameters};
 
-/// The way back from the features to the parameters.
+/// The backward pass from the features to the parameters.
 pub struct Backward<'a> {
     parameters: Parameters<'a>,
     gradients: Gradients,
 }
 
 impl<'a> Backward<'a> {
-    /// The gradient of all parameters from that of the features [images, channels].
+    /// Computes the gradient of all parameters from that of the features [images, channels].
     pub fn run(
         architecture: &Architecture,
         parameters: &'a Tensor,
@@ -44,7 +44,7 @@ impl<'a> Backward<'a> {
         back.gradients.flat()
     }
 
-    /// The gradient of a block's input, if that is no image of the camera.
+    /// Computes the gradient of a block's input; `None` if that is the network's input image.
     fn block(
         &mut self,
         block: &Block,
@@ -98,7 +98,7 @@ impl<'a> Backward<'a> {
         }
     }
 
-    /// The gradient of the input of a pointwise convolution from that of its normalised output.
+    /// Computes the gradient of the input of a pointwise convolution from that of its normalised output.
     fn pointwise(
         &mut self,
         place: &ConvPlace,
@@ -114,7 +114,7 @@ impl<'a> Backward<'a> {
         of_x.matmul(&self.weight(place)?)?.reshape(input.shape())
     }
 
-    /// The weights [channels, inputs or taps] of a convolution.
+    /// Returns the weights [channels, inputs or taps] of a convolution.
     fn weight(&self, place: &ConvPlace) -> Result<Tensor> {
         self.parameters.rows(&place.weight, place.channels)
     }

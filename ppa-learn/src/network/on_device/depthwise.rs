@@ -1,4 +1,4 @@
-//! Convolution of each channel by its own window, with its gradients.
+//! Depthwise convolution, with its gradients.
 
 use candle_core::{Error, Result, Tensor};
 
@@ -10,7 +10,7 @@ use crate::kernels::depthwise::Window;
 /// `COLUMNS` of `kernels.cu`.
 const COLUMNS: usize = 4;
 
-/// [images, rows, columns, channels] of x [images, height, width, channels] and weights [channels, kernel * kernel].
+/// Computes [images, rows, columns, channels] from x [images, height, width, channels] and weights [channels, kernel * kernel].
 ///
 /// If x has one channel, every output channel reads it.
 pub fn depthwise(x: &Tensor, weights: &Tensor, window: Window) -> Result<Tensor> {
@@ -38,7 +38,7 @@ pub fn depthwise(x: &Tensor, weights: &Tensor, window: Window) -> Result<Tensor>
     Launch::new("depthwise", out, threads, &sizes).run(&[x, &by_tap(weights)?])
 }
 
-/// The gradient of x, which is of the shape `of`, from that of the output.
+/// Computes the gradient of x, with the shape of `of`, from that of the output.
 pub fn of_input(
     gradient: &Tensor,
     weights: &Tensor,
@@ -61,7 +61,7 @@ pub fn of_input(
     launch.run(&[gradient, &by_tap(weights)?])
 }
 
-/// The gradient of the weights [channels, kernel * kernel].
+/// Computes the gradient of the weights [channels, kernel * kernel].
 pub fn of_weights(x: &Tensor, gradient: &Tensor, window: Window) -> Result<Tensor> {
     let (images, height, width, inputs) = x.dims4()?;
     let (_, rows, columns, channels) = gradient.dims4()?;
@@ -81,7 +81,7 @@ pub fn of_weights(x: &Tensor, gradient: &Tensor, window: Window) -> Result<Tenso
     by_tap.t()?.contiguous()
 }
 
-/// Refuses windows that the kernels do not know.
+/// Refuses windows without a kernel.
 fn check(Window { kernel, stride }: Window) -> Result<()> {
     match (kernel, stride) {
         (3 | 5, 1 | 2) => Ok(()),
@@ -92,12 +92,12 @@ fn check(Window { kernel, stride }: Window) -> Result<()> {
     }
 }
 
-/// Groups of neighbouring columns, each of which a thread writes.
+/// Returns the number of groups of neighbouring columns, each written by one thread.
 fn groups(columns: usize) -> usize {
     columns.div_ceil(COLUMNS)
 }
 
-/// Weights [kernel * kernel, channels], which neighbouring threads read from neighbouring places.
+/// Returns weights [kernel * kernel, channels], so that neighbouring threads read neighbouring addresses.
 fn by_tap(weights: &Tensor) -> Result<Tensor> {
     weights.t()?.contiguous()
 }

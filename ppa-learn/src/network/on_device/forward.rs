@@ -12,25 +12,25 @@ use super::squeeze::Gate;
 /// A pass through the layers.
 pub struct Forward<'a> {
     pub parameters: Parameters<'a>,
-    /// The running statistics, which normalisations take in evaluation. In training they take the batch.
+    /// The running statistics for evaluation; `None` to normalise by the batch.
     pub running: Option<&'a Tensor>,
-    /// Gains [images, 1] of stochastic depth of a residual block in training.
+    /// Returns the gains [images, 1] of stochastic depth of a residual block in training.
     pub gains: &'a mut dyn FnMut(&Block) -> Result<Option<Tensor>>,
     /// Means and unbiased variances of the batch, in the order of the running statistics.
     pub moments: Vec<Tensor>,
     pub tape: Tape,
 }
 
-/// What the gradient needs of a pass in training.
+/// Values of a training pass that the gradient needs.
 #[derive(Default)]
 pub struct Tape {
-    /// Of each block in turn.
+    /// Tapes of the blocks, in order.
     pub blocks: Vec<BlockTape>,
     /// Input and output of the head's convolution.
     pub head: Option<(Tensor, Normed)>,
 }
 
-/// What the gradient of a block needs.
+/// Values that the gradient of a block needs.
 pub struct BlockTape {
     pub input: Tensor,
     pub expanded: Expanded,
@@ -117,7 +117,7 @@ impl Layers for Forward<'_> {
 }
 
 impl Forward<'_> {
-    /// A convolution and its normalisation, with SiLU behind it where it is `activated`.
+    /// Computes a convolution and its normalisation, followed by SiLU if `activated`.
     fn conv(&mut self, place: &ConvPlace, x: &Tensor, activated: bool) -> Result<Normed> {
         let weight = self.parameters.rows(&place.weight, place.channels)?;
         let x = match place.kind {

@@ -20,14 +20,14 @@ fn normal(shape: &[usize], seed: u64) -> Tensor {
     Tensor::from_vec(values, shape, &Device::Cpu).unwrap()
 }
 
-/// The sum of the products of two tensors, in f64.
+/// Returns the dot product of two tensors, in f64.
 fn dot(a: &Tensor, b: &Tensor) -> f64 {
     let [a, b] = [a, b].map(|x| x.to_dtype(DType::F64).unwrap());
     (a * b).unwrap().sum_all().unwrap().to_scalar().unwrap()
 }
 
-/// That the gradient of each input of `operation`, in a random direction, is what a small step in that direction changes.
-/// `gradients` gives them from the inputs and the gradient of the output.
+/// Checks the gradient of each input of `operation` against a finite difference in a random direction.
+/// `gradients` computes the gradients from the inputs and the gradient of the output.
 fn check<const N: usize>(
     inputs: [Tensor; N],
     operation: impl Fn(&[Tensor; N]) -> Result<Tensor>,
@@ -47,7 +47,7 @@ fn check<const N: usize>(
         };
         let expected = (moved(1.0) - moved(-1.0)) / (2.0 * step);
         let found = dot(gradient, &direction);
-        // A directional derivative scatters by the length of the gradient.
+        // The scale of a directional derivative is the length of the gradient.
         let size = dot(gradient, gradient).sqrt();
         assert!(
             (found - expected).abs() < 5e-3 * (1.0 + size),
@@ -157,7 +157,7 @@ proptest! {
 
 #[test]
 fn a_window_sums_what_lies_under_it_and_zeros_around() {
-    // Ones under ones: the number of pixels of the image under each place of the window.
+    // With ones in image and window: the number of image pixels under each position of the window.
     let x = Tensor::ones((1, 3, 4, 2), DType::F32, &Device::Cpu).unwrap();
     let weights = Tensor::ones((2, 9), DType::F32, &Device::Cpu).unwrap();
     let found = |stride| -> Vec<f32> {

@@ -5,7 +5,7 @@ use candle_core::{Result, Shape, Tensor};
 use super::reduce;
 use crate::device::launch::Launch;
 
-/// The terms of a value, as `kernels.cu` numbers them.
+/// Bit flags of the terms of a value, as in `kernels.cu`.
 const IMAGE: usize = 1;
 const FACTOR: usize = 2;
 const ADDEND: usize = 4;
@@ -30,7 +30,7 @@ pub struct Gradient<'a> {
 }
 
 impl Normed {
-    /// By the moments of x itself; affine is [weight and bias, channels].
+    /// Normalises by the moments of x itself; affine is [weight and bias, channels].
     pub fn by_batch(x: Tensor, affine: &Tensor, activated: bool) -> Result<Self> {
         let (pixels, channels) = size(&x);
         let parts = reduce::parts(channels, pixels);
@@ -42,7 +42,7 @@ impl Normed {
         Ok(Self { x, norm, activated })
     }
 
-    /// By moments [channels] that do not depend on x.
+    /// Normalises by moments [channels] that do not depend on x.
     pub fn by_moments(
         x: Tensor,
         affine: &Tensor,
@@ -56,7 +56,7 @@ impl Normed {
         Ok(Self { x, norm, activated })
     }
 
-    /// Mean and unbiased variance, both [channels].
+    /// Returns mean and unbiased variance, both [channels].
     pub fn moments(&self) -> Result<[Tensor; 2]> {
         Ok([self.norm.get(0)?, self.norm.get(4)?])
     }
@@ -65,13 +65,13 @@ impl Normed {
         self.x.shape()
     }
 
-    /// Pixels of an image.
+    /// Returns the number of pixels of an image.
     pub fn pixels(&self) -> usize {
         let dims = self.x.dims();
         dims[1] * dims[2]
     }
 
-    /// The normalised and activated image, times a factor [images, channels], plus another image.
+    /// Computes the normalised and activated image, times a factor [images, channels], plus another image.
     pub fn image(&self, factor: Option<&Tensor>, addend: Option<&Tensor>) -> Result<Tensor> {
         let (_, channels) = size(&self.x);
         let form = given(factor, FACTOR) | given(addend, ADDEND) | self.form();
@@ -86,12 +86,12 @@ impl Normed {
         ])
     }
 
-    /// The means [images, channels] of the activated image.
+    /// Computes the means [images, channels] of the activated image.
     pub fn mean(&self) -> Result<Tensor> {
         self.pool(None)
     }
 
-    /// The sums [images, channels] of the activated image times another one.
+    /// Computes the sums [images, channels] of the activated image times another one.
     pub fn dot(&self, image: &Tensor) -> Result<Tensor> {
         self.pool(Some(image))
     }
@@ -109,7 +109,7 @@ impl Normed {
         reduce::sum(launch.run(&[&self.x, norm, image.unwrap_or(norm)])?)
     }
 
-    /// The gradients of x and of affine [weight and bias, channels], of a normalisation by the batch.
+    /// Computes the gradients of x and of affine [weight and bias, channels] for a normalisation by the batch.
     pub fn gradients(&self, of: Gradient) -> Result<(Tensor, Tensor)> {
         let (all_pixels, channels) = size(&self.x);
         let (x, norm, pixels) = (&self.x, &self.norm, self.pixels());
@@ -141,13 +141,13 @@ impl Normed {
     }
 }
 
-/// Pixels of all images, and channels.
+/// Returns the number of pixels of all images, and of channels.
 fn size(x: &Tensor) -> (usize, usize) {
     let channels = *x.dims().last().expect("images have channels");
     (x.elem_count() / channels, channels)
 }
 
-/// The number of a term that is there.
+/// Returns the flag of a term if it is given, otherwise 0.
 fn given(term: Option<&Tensor>, number: usize) -> usize {
     term.map_or(0, |_| number)
 }

@@ -15,12 +15,12 @@ impl Parameters<'_> {
         self.0.narrow(0, range.start, range.len())
     }
 
-    /// A matrix with `rows` rows.
+    /// Returns a range as a matrix with `rows` rows.
     pub fn rows(&self, range: &Range<usize>, rows: usize) -> Result<Tensor> {
         self.values(range)?.reshape((rows, ()))
     }
 
-    /// [weight and bias, channels]; the bias lies behind the weight.
+    /// Returns [weight and bias, channels]; the bias directly follows the weight.
     pub fn affine(&self, place: &NormPlace) -> Result<Tensor> {
         self.rows(&(place.weight.start..place.bias.end), 2)
     }
@@ -40,7 +40,7 @@ impl Gradients {
         self.add(&(place.weight.start..place.bias.end), gradient)
     }
 
-    /// The gradient of all parameters, each of which must have one.
+    /// Returns the gradient of all parameters, each of which must have one.
     pub fn flat(mut self) -> Result<Tensor> {
         self.0.sort_by_key(|(range, _)| range.start);
         let tensors: Vec<Tensor> = self.0.into_iter().map(|(_, tensor)| tensor).collect();

@@ -6,17 +6,17 @@ use crate::device::launch::Launch;
 
 /// Threads that keep a device busy.
 const THREADS: usize = 262_144;
-/// Terms that are worth a thread.
+/// Minimum number of terms per thread.
 const TERMS: usize = 8;
-/// Parts that a thread adds up before their sum is shared between threads again.
+/// Number of parts that one thread adds up before the sum is divided among threads again.
 const FEW: usize = 128;
 
-/// The number of parts in which `values` sums over `terms` terms each are made.
+/// Returns the number of parts into which `values` sums over `terms` terms each are divided.
 pub fn parts(values: usize, terms: usize) -> usize {
     (THREADS / values).clamp(1, terms.div_ceil(TERMS))
 }
 
-/// The sum [..] of parts [parts, ..].
+/// Computes the sum [..] of parts [parts, ..].
 pub fn sum(mut parts: Tensor) -> Result<Tensor> {
     let mut shape = parts.dims().to_vec();
     let values: usize = shape[1..].iter().product();

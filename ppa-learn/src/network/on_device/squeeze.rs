@@ -8,7 +8,7 @@ use super::parameters::{Gradients, Parameters};
 use super::reduce;
 use crate::device::launch::Launch;
 
-/// Gates of channels, and what their gradient needs; all [images, channels] or [images, squeezed].
+/// Gates of channels, and the values that their gradient needs; all [images, channels] or [images, squeezed].
 pub struct Gate {
     pooled: Tensor,
     hidden: Tensor,
@@ -17,7 +17,7 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// From the mean of each channel over each image.
+    /// Computes the gates from the mean of each channel over each image.
     pub fn new(place: &SqueezePlace, parameters: Parameters, pooled: Tensor) -> Result<Self> {
         let hidden = linear(&place.squeeze, parameters, &pooled)?;
         let active = hidden.silu()?;
@@ -30,7 +30,7 @@ impl Gate {
         })
     }
 
-    /// The gradient of the means from that of the gates.
+    /// Computes the gradient of the means from that of the gates.
     pub fn backward(
         &self,
         place: &SqueezePlace,
@@ -65,7 +65,7 @@ fn linear(place: &LinearPlace, parameters: Parameters, x: &Tensor) -> Result<Ten
     product.broadcast_add(&parameters.values(&place.bias)?)
 }
 
-/// The gradient of x from that of the output.
+/// Computes the gradient of x from that of the output.
 fn of_linear(
     place: &LinearPlace,
     parameters: Parameters,
