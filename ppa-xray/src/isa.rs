@@ -1,7 +1,7 @@
-//! Copies of one kernel for the vector instructions of the machine, and the choice among them.
+//! Compiles a kernel for several vector instruction sets and selects one that the machine supports.
 #![allow(unsafe_code)]
 
-/// A set of vector instructions that this machine has.
+/// A vector instruction set supported by this machine.
 ///
 /// Every kernel rounds each operation on its own (no fused multiply-add), so all sets give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,7 @@ enum Set {
 }
 
 impl Isa {
-    /// All sets of this machine, the widest last.
+    /// All supported sets, the widest last.
     fn available() -> impl DoubleEndedIterator<Item = Self> {
         #[cfg(target_arch = "x86_64")]
         let sets = [
@@ -38,7 +38,7 @@ impl Isa {
             .map(|(set, _)| Self(set))
     }
 
-    /// The widest set of this machine.
+    /// The widest supported set.
     pub fn widest() -> Self {
         Self::available().next_back().unwrap_or(Self(Set::Baseline))
     }
@@ -62,7 +62,7 @@ impl Isa {
     }
 }
 
-/// Asks for the memory of an element that will be read soon, without waiting for it.
+/// Prefetches the memory of an element that will be read soon.
 #[inline(always)]
 pub(crate) fn prefetch<T>(slice: &[T], index: usize) {
     #[cfg(target_arch = "x86_64")]

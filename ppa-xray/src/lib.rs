@@ -1,24 +1,26 @@
-//! Monte Carlo transport of diagnostic x-rays (5–150 keV) through voxel phantoms, and the radiograph it makes.
+//! Monte Carlo transport of diagnostic x-rays (5–150 keV) through voxel phantoms, and the resulting radiographs.
 //!
-//! A [`Spectrum`] says which photons leave the source, a [`Material`] what a gram of matter does to them:
+//! A [`Spectrum`] gives the photons that leave the source, a [`Material`] their interactions with matter:
 //! photoelectric absorption, Rayleigh scattering with form factors, Compton scattering off bound and moving electrons
 //! (or, by [`ComptonModel`], Klein–Nishina × S(q)). By [`FormFactors`], Rayleigh scattering follows measured form factors of tissues.
-//! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines make a [`Radiograph`] of them:
-//! [`analog`] follows every photon, [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
-//! exposure that the settings give. A [`PreparedPhantom`] keeps what the exposures of one phantom share, reports progress, and gives a preview. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed, until the image is
+//! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines compute a [`Radiograph`] from them:
+//! [`analog`] follows every photon; [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
+//! exposure given in the settings. A [`PreparedPhantom`] keeps the data shared by the exposures of one phantom, reports progress,
+//! and computes a preview. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed until the image is
 //! precise enough, and counts the [`Dose`].
 //!
 //! `mcgpu` runs input files of MC-GPU v1.3.
 //!
-//! Units: mm, radians, keV, g/cm³, mass attenuation in cm²/g, images in eV/cm² per history. Frames: the phantom stands in
+//! Units: mm, radians, keV, g/cm³, mass attenuation in cm²/g, images in eV/cm² per history. Frames: the phantom is in
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the
 //! voxels.
-//! Left out: electrons deposit where they are born, since at 150 keV they travel about 0.3 mm in water, less than a voxel;
-//! photons below 5 keV are absorbed on the spot; of fluorescence the K x-rays above 5 keV are followed. Cross sections and spectra reach down to 1 keV.
-//! A [`Projection`] begins with a point source and a detector that takes everything; its [`Source`] adds focal spot, heel
-//! effect and collimation, its [`Receptor`] grid, CsI or selenium, blur and electronic noise.
-//! Repeatable: random numbers are addressed by seed and history and tallies are integers, so the number of threads
-//! changes no bit.
+//! Approximations: electrons deposit their energy where they are set free, since at 150 keV they travel about 0.3 mm in water,
+//! less than a voxel; photons below 5 keV are absorbed on the spot; only fluorescence K x-rays above 5 keV are followed. Cross
+//! sections and spectra extend down to 1 keV.
+//! [`Projection::new`] starts with a point source and a detector that absorbs everything; [`Source`] adds focal spot, heel
+//! effect and collimation, [`Receptor`] grid, CsI or selenium, blur and electronic noise.
+//! Results are reproducible: random numbers are addressed by seed and history and tallies are integers, so the number of
+//! threads does not change a bit.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3, Vector3};
@@ -62,19 +64,19 @@ mod setters;
 mod transport;
 mod vector_math;
 
-/// Scenes of the public interface's tests, which tests in here look at too; not every scene.
+/// Scenes of the public interface's tests, some of which the unit tests use as well.
 #[cfg(test)]
 #[path = "../tests/it/scenes.rs"]
 #[expect(dead_code, reason = "some scenes are for the other tests alone")]
 mod scenes;
 
-// The name that `scenes` knows this crate by.
+// The name by which `scenes` refers to this crate.
 #[cfg(test)]
 extern crate self as ppa_xray;
 
-/// Vectors, points and poses of this crate's interface, in the version that it takes.
+/// Vectors, points and poses used in the interface of this crate, in the required version.
 pub use nalgebra;
-/// Grids and volumes of this crate's interface, in the version that it takes.
+/// Grids and volumes used in the interface of this crate, in the required version.
 pub use ppa_ct;
 
 pub use ppa_core::{Part, PartError, Side};

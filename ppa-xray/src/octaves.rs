@@ -1,10 +1,10 @@
-//! Grids with a fixed number of equal steps in every octave, indexed by the bits of a number instead of its logarithm.
+//! Grids with a fixed number of equal steps per octave, indexed by the bits of a number instead of its logarithm.
 
-/// Nodes at 2^k (1 + i / 2^bits): bin and position inside it cost a shift and a mask.
+/// Nodes at 2^k (1 + i / 2^bits); the bin of a value and the position inside it cost a shift and a mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Octaves {
     first_key: u64,
-    /// One less than the nodes.
+    /// Number of bins, one less than the nodes.
     bins: usize,
     shift: u32,
 }
@@ -22,7 +22,7 @@ impl Octaves {
         }
     }
 
-    /// The same grid with every bin cut into 2^`bits` equal ones.
+    /// The same grid with every bin divided into 2^`bits` equal bins.
     pub(crate) fn refined(self, bits: u32) -> Self {
         Self {
             first_key: self.first_key << bits,
@@ -47,7 +47,7 @@ impl Octaves {
         f64::from_bits(self.first_key << self.shift)
     }
 
-    /// Bin of `x` and how far into it `x` lies, 0 to 1; values outside go to the nearest end of the grid.
+    /// Bin of `x` and its position in the bin, 0 to 1; values outside go to the nearest end of the grid.
     #[inline]
     pub(crate) fn locate(&self, x: f64) -> (usize, f64) {
         let bits = x.to_bits();

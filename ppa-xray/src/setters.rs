@@ -1,6 +1,6 @@
-//! Methods `with_…` of settings, which other crates cannot construct as struct literals, so that fields can be added without breaking them.
+//! Methods `with_…` of settings. Other crates cannot construct settings as struct literals, so fields can be added without breaking them.
 
-/// Writes methods that take a value by themselves and give back the changed settings.
+/// Defines methods that take a value and return the changed settings.
 macro_rules! setters {
     ($settings:ident { $($method:ident: $field:ident = $value:ty,)* }) => {
         impl $settings {

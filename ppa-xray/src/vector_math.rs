@@ -1,9 +1,9 @@
-//! Arithmetic in `f32` that compilers turn into vector code and that gives the same bits on every machine.
+//! Arithmetic in `f32` that compilers vectorise and that gives the same bits on every machine.
 //!
-//! Polynomials of our own (minimax, by iteratively reweighted least squares; for the exponential that of (eʳ − 1 − r)/r²): no library whose
-//! last digit depends on the platform, no fused multiply-add, no branch.
+//! The polynomials are our own (minimax, by iteratively reweighted least squares; for the exponential that of (eʳ − 1 − r)/r²). There is no
+//! library whose last digit depends on the platform, no fused multiply-add and no branch.
 
-/// Numbers that are handled together.
+/// Number of values processed together.
 pub(crate) const WIDTH: usize = 8;
 
 /// Appends zeros up to a multiple of [`WIDTH`].
@@ -11,14 +11,14 @@ pub(crate) fn pad(values: &mut Vec<f32>) {
     values.resize(values.len().next_multiple_of(WIDTH), 0.0);
 }
 
-/// 1.5 · 2²³: adding it rounds to the nearest whole number, which is then in the low bits.
+/// 1.5 · 2²³: adding it rounds to the nearest integer, which is then in the low bits.
 const MAGIC: f32 = 12_582_912.0;
 
 /// ln 2 in two parts; the first has few enough digits that its multiples are exact.
 const LN2_HIGH: f32 = 0.693_359_4;
 const LN2_LOW: f32 = -2.121_944_4e-4;
 
-/// eˣ within 2e-7, relative, from −86 to 80; beyond, the value at the nearer of the two.
+/// eˣ to a relative error of 2e-7 from −86 to 80; beyond, the value at the nearer limit.
 #[inline(always)]
 pub(crate) fn exp(x: f32) -> f32 {
     let x = if x > -86.0 { x } else { -86.0 };
@@ -32,7 +32,7 @@ pub(crate) fn exp(x: f32) -> f32 {
     f32::from_bits(power.to_bits().wrapping_add(shifted.to_bits() << 23))
 }
 
-/// Sine and cosine of `turn` whole turns, `turn` in [0, 1); within 2e-7.
+/// Sine and cosine of `turn` full turns, `turn` in [0, 1); within 2e-7.
 #[inline(always)]
 pub(crate) fn sin_cos_turn(turn: f32) -> (f32, f32) {
     let quarters = turn * 4.0;
@@ -63,9 +63,9 @@ pub(crate) fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Largest whole number not above `x`, for 0 ≤ x < 2²²; as a number and as an index.
+/// Largest integer not above `x`, for 0 ≤ x < 2²²; as a number and as an index.
 ///
-/// Adding 2²³ rounds in the last place, and leaves the integer in the low bits: casts and libraries would not vectorise.
+/// Adding 2²³ rounds in the last place and leaves the integer in the low bits; casts and library calls would not vectorise.
 #[inline(always)]
 pub(crate) fn floor(x: f32) -> (f32, u32) {
     const MAGIC: f32 = 8_388_608.0;

@@ -1,4 +1,4 @@
-//! Penumbra that the collimator blades cast on the detector plane.
+//! Penumbra of the collimator blades on the detector plane.
 
 use nalgebra::{Point2, Point3};
 
@@ -7,12 +7,12 @@ use crate::beam::source::FocalSpot;
 
 /// The field of the beam as seen from every point of the focal spot.
 ///
-/// Blades at the distance b from the spot are openings in a plane square to device z. On the detector plane, at the distance D, the
-/// edges of the field move by D/b − 1 for every mm of the spot, the other way. The depth of a tilted spot is neglected: it moves an
-/// edge by less than a tenth of the penumbra.
+/// Blades at the distance b from the spot are openings in a plane perpendicular to device z. On the detector plane, at the distance D,
+/// the edges of the field move by D/b − 1 for every mm of the spot, in the opposite direction. The depth of a tilted spot is neglected:
+/// it moves an edge by less than a tenth of the penumbra.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Blades {
-    /// From the middle of the spot.
+    /// Field as seen from the middle of the spot.
     field: Field,
     /// D/b − 1; 0 for sharp edges.
     edge_per_spot: f64,
@@ -21,7 +21,7 @@ pub(crate) struct Blades {
 }
 
 impl Blades {
-    /// Blades that leave `field` open on a plane `plane_mm` away; at the distance of that plane if `blades_mm` is none. `axes`
+    /// Blades that leave `field` open on a plane `plane_mm` away; if `blades_mm` is `None`, they are in that plane. `axes`
     /// are the components along device x and y of those of the spot's plane.
     pub fn new(field: Field, plane_mm: f64, blades_mm: Option<f64>, axes: [f64; 2]) -> Self {
         Self {
@@ -31,7 +31,7 @@ impl Blades {
         }
     }
 
-    /// What photons from a point of the spot can reach.
+    /// The field reached by photons from a point of the spot.
     pub fn field_from(&self, spot: &Point3<f64>) -> Field {
         let shift = [0, 1].map(|axis| self.edge_per_spot * spot[axis]);
         Field {
@@ -40,17 +40,17 @@ impl Blades {
         }
     }
 
-    /// What any point of the spot can reach.
+    /// The field reached by photons from any point of the spot.
     pub fn reached(&self, spot: &FocalSpot) -> Field {
         self.grown(self.edge_per_spot * spot.reach_mm())
     }
 
-    /// The area that the whole spot illuminates, except for the outermost 3e-3 of a Gaussian one; sides are negative where there is none.
+    /// The field illuminated by the entire spot, except for the outermost 3e-3 of a Gaussian one; sides are negative if there is none.
     pub fn fully_lit(&self, spot: &FocalSpot) -> Field {
         self.grown(-self.edge_per_spot * spot.shadow_reach_mm())
     }
 
-    /// The shares of a strip of the spot along device x and y that light a place; `strips` name the strips, of `count` equally
+    /// Share of a cell of the spot that lights a point; `strips` are its strips along device x and y, of `count` equally
     /// strong ones along each axis.
     pub fn lit_share(
         &self,
@@ -69,7 +69,7 @@ impl Blades {
         along(0) * along(1)
     }
 
-    /// The part of the spot that lights a place: along device x and y, the shares of the spot below its first and its last point.
+    /// The part of the spot that lights a point: along device x and y, the shares of the spot below its first and its last point.
     pub fn lit_part(&self, spot: &FocalSpot, at: Point2<f64>) -> [[f64; 2]; 2] {
         if self.edge_per_spot == 0.0 || spot.is_point() {
             return [[0.0, f64::from(u8::from(self.field.contains(&at)))]; 2];
@@ -82,7 +82,7 @@ impl Blades {
         })
     }
 
-    /// The field grown by the same length on all sides.
+    /// The field enlarged by the same length on all sides.
     fn grown(&self, by_mm: f64) -> Field {
         let by = self.axes.map(|axis| by_mm * axis);
         Field {

@@ -7,7 +7,7 @@ use crate::beam::field::Field;
 use crate::beam::raster::Raster;
 use crate::setters::setters;
 
-/// A flat detector square to device z; columns run along device x, rows along device y.
+/// A flat detector perpendicular to device z. Columns run along device x, rows along device y.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -28,7 +28,7 @@ setters!(Detector {
 });
 
 impl Detector {
-    /// A detector whose centre faces the source.
+    /// Returns a detector whose centre is at the foot of the perpendicular through the source.
     pub const fn centred(columns: u32, rows: u32, pixel_mm: f64) -> Self {
         Self {
             columns,
@@ -63,7 +63,7 @@ impl Detector {
         [self.columns, self.rows].map(|pixels| f64::from(pixels) * self.pixel_mm)
     }
 
-    /// The rectangle it covers.
+    /// The rectangle that the detector covers.
     pub(crate) fn field(&self) -> Field {
         Field::centred(self.centre_mm, self.size_mm())
     }

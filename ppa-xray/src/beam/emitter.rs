@@ -1,4 +1,4 @@
-//! Photons of one exposure as they leave the focal spot: drawn one by one, or as the fluence at a point.
+//! Photons of one exposure as they leave the focal spot: sampled one by one, or as the fluence at a point.
 
 use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
@@ -21,23 +21,23 @@ pub(crate) struct Emission {
     pub energy_kev: f64,
 }
 
-/// The source of one exposure, ready to send photons.
+/// The source of one exposure.
 ///
-/// Every point of the focal spot sends photons into the field, evenly in solid angle but for the heel effect.
-/// A history is a photon that is sent into the field.
+/// Every point of the focal spot emits photons into the field, uniformly in solid angle apart from the heel effect.
+/// A history is a photon that is emitted into the field.
 #[derive(Debug, Clone)]
 pub(crate) struct Emitter {
     spectrum: Spectrum,
     spot: FocalSpot,
     plane: SpotPlane,
     blades: Blades,
-    /// What photons from any point of the spot reach.
+    /// The field reached by photons from any point of the spot.
     field: Field,
     distance_mm: f64,
     /// Smallest distance from the spot to the detector plane, along z.
     nearest_mm: f64,
     heel: Option<Heel>,
-    /// ∫ I dΩ over the field, mean over the spot: I is 1 on the central ray.
+    /// ∫ I dΩ over the field, averaged over the spot: I is 1 on the central ray.
     emitted_sr: f64,
 }
 
@@ -46,19 +46,19 @@ const SPOT_POINTS: usize = 5;
 const FIELD_POINTS: u32 = 96;
 
 impl Emitter {
-    /// The focal spot's photons.
+    /// The emitter of the focal spot.
     ///
     /// # Errors
-    /// [`ProjectionError`] when heel effect, focal spot or field make no sense.
+    /// [`ProjectionError`] if heel effect, focal spot or field are invalid.
     pub fn new(projection: &Projection, spectrum: &Spectrum) -> Result<Self, ProjectionError> {
         projection.validate()?;
         Self::of_spot(projection, spectrum, projection.source.focal_spot)
     }
 
-    /// Photons that leave another area than the focal spot; the projection is valid.
+    /// An emitter with another area than the focal spot; the projection must be valid.
     ///
     /// # Errors
-    /// [`ProjectionError`] when the heel effect makes no sense.
+    /// [`ProjectionError`] if the heel effect is invalid.
     pub fn of_spot(
         projection: &Projection,
         spectrum: &Spectrum,
@@ -74,7 +74,7 @@ impl Emitter {
         );
         let field = blades.reached(&spot);
         let tilt: f64 = plane.axes.iter().map(|axis| axis.z.abs()).sum();
-        // An area of a tenth of the distance, the largest there is, takes less than a tenth of it away.
+        // The largest area is a tenth of the distance, which reduces the distance by less than a tenth.
         let nearest_mm = distance_mm - spot.reach_mm() * tilt;
         let spots = points_of(&spot, &plane, SPOT_POINTS);
         let heel = match &projection.source.heel_effect {
@@ -101,7 +101,7 @@ impl Emitter {
         Ok(emitter)
     }
 
-    /// ∫ I dΩ over the field, mean over the spot: I is 1 on the central ray.
+    /// ∫ I dΩ over the field, averaged over the spot: I is 1 on the central ray.
     pub fn emitted_sr(&self) -> f64 {
         self.emitted_sr
     }
@@ -136,13 +136,13 @@ impl Emitter {
         intensity * ray.z / length_mm.powi(3)
     }
 
-    /// A photon, drawn with as many random numbers as it takes.
+    /// Samples a photon, with a variable number of random numbers.
     #[inline]
     pub fn emit(&self, rng: &mut Philox) -> Emission {
         let d = self.distance_mm;
         let size = self.field.size_mm();
         loop {
-            // Points even on the field are kept with probability ∝ I cos³θ / height², which leaves I dΩ.
+            // Points uniform over the field are kept with probability ∝ I cos³θ / height², which leaves I dΩ.
             let spot = self.spot.sample(rng);
             let x = self.field.low_mm[0] + size[0] * rng.unit();
             let y = self.field.low_mm[1] + size[1] * rng.unit();
@@ -181,33 +181,33 @@ impl Emitter {
         }
     }
 
-    /// The spectrum of a plain beam: all photons leave the origin, evenly in solid angle.
+    /// The spectrum of a plain beam, whose photons all leave the origin uniformly in solid angle.
     pub fn plain_beam(&self) -> Option<&Spectrum> {
         (self.spot.is_point() && self.heel.is_none()).then_some(&self.spectrum)
     }
 
-    /// Field of the beam in the detector plane, penumbra included: no photon is sent outside it.
+    /// Field of the beam in the detector plane, penumbra included; no photon is emitted outside it.
     pub fn field(&self) -> &Field {
         &self.field
     }
 
-    /// What the whole focal spot lights.
+    /// The field illuminated by the entire focal spot.
     pub fn fully_lit(&self) -> Field {
         self.blades.fully_lit(&self.spot)
     }
 
-    /// Whether the blades let photons from a point of the focal spot through to a place of the detector plane.
+    /// Whether the blades let photons from a point of the focal spot through to a point of the detector plane.
     #[inline]
     pub fn lights(&self, spot: &Point3<f64>, at: Point2<f64>) -> bool {
         self.blades.field_from(spot).contains(&at)
     }
 
-    /// Share of a strip of the focal spot, of `count` along each axis as in [`FocalSpot::strips_mm`], that the blades let through.
+    /// Share of a cell of the focal spot, of `count` strips along each axis as in [`FocalSpot::strips_mm`], that the blades let through.
     pub fn lit_share(&self, strips: [usize; 2], count: usize, at: Point2<f64>) -> f64 {
         self.blades.lit_share(&self.spot, strips, count, at)
     }
 
-    /// The part of the focal spot that lights a place, see [`Blades::lit_part`].
+    /// The part of the focal spot that lights a point, see [`Blades::lit_part`].
     pub fn lit_part(&self, at: Point2<f64>) -> [[f64; 2]; 2] {
         self.blades.lit_part(&self.spot, at)
     }
@@ -223,24 +223,24 @@ impl Emitter {
         self.plane.at(offsets_mm)
     }
 
-    /// `per_side`² points of the focal spot, device frame, all of the same strength; one point for a point.
+    /// `per_side`² points of the focal spot, device frame, with equal intensity; a single one for a point source.
     pub fn spot_points(&self, per_side: usize) -> Vec<Point3<f64>> {
         points_of(&self.spot, &self.plane, per_side)
     }
 
-    /// A point of the focal spot, drawn by its intensity; a point draws nothing.
+    /// Samples a point of the focal spot by its intensity; a point source uses no random numbers.
     #[inline]
     pub fn draw_spot(&self, rng: &mut Philox) -> Point3<f64> {
         self.plane.at(self.spot.sample(rng))
     }
 
     /// Photons per cm² and history at device (x, y) of the bare detector plane if all left from `spot`,
-    /// where [`Emitter::lights`]; how many of them come from which spectrum says [`Emitter::mixture`].
+    /// where [`Emitter::lights`] is true; [`Emitter::mixture`] gives their spectra.
     pub fn open_fluence_cm2(&self, spot: &Point3<f64>, at: Point2<f64>) -> f64 {
         100.0 * self.intensity_per_mm2(spot, at) / self.emitted_sr
     }
 
-    /// The spectra that photons are drawn from: one, or with heel effect several.
+    /// The spectra of the photons: one, or several with heel effect.
     pub fn spectra(&self) -> &[Spectrum] {
         match &self.heel {
             None => std::slice::from_ref(&self.spectrum),
@@ -253,7 +253,7 @@ impl Emitter {
         SpectralLines::of(self.spectra())
     }
 
-    /// Which of [`Emitter::spectra`] photons of a direction (unit vector) come from: `lower`, and `lower + 1` for
+    /// The two [`Emitter::spectra`] of photons in a direction (unit vector): `lower`, and `lower + 1` for
     /// `upper_share` of them.
     #[inline]
     pub fn mixture(&self, direction: &Vector3<f64>) -> Mixture {
@@ -267,7 +267,7 @@ impl Emitter {
         }
     }
 
-    /// Photons that the spot sends into the field per mAs, if the spectrum came from the tube model.
+    /// Photons that the spot emits into the field per mAs, if the spectrum came from the tube model.
     pub fn photons_per_mas(&self) -> Option<f64> {
         const CM2_PER_SR_AT_1M: f64 = 1e4;
         let fluence = self.spectrum.fluence_per_mas_cm2_at_1m()?;
@@ -321,7 +321,7 @@ mod tests {
         turned
     }
 
-    /// Photons drawn one by one fall where the fluence says: chi² over 6 x 6 cells of the field, 35 degrees
+    /// The positions of sampled photons follow the fluence: chi² over 6 x 6 cells of the field, 35 degrees
     /// of freedom, for a plain and for a demanding source, and for an area of 80 mm.
     #[test]
     fn photons_fall_as_the_fluence_says() {
@@ -380,7 +380,7 @@ mod tests {
         }
     }
 
-    /// Energies drawn towards the anode and away from it have the mean of the mixture at that direction.
+    /// Energies sampled towards the anode and away from it have the mean of the mixture in that direction.
     #[test]
     fn energies_are_those_of_the_take_off_angle() {
         let emitter = Emitter::new(&demanding(), &spectrum()).unwrap();

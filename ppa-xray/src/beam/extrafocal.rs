@@ -1,4 +1,4 @@
-//! Photons from outside the focal spot, in addition to those from it.
+//! Photons from outside the focal spot.
 
 use nalgebra::Point2;
 
@@ -10,19 +10,19 @@ use crate::beam::spectrum::Spectrum;
 /// Extrafocal radiation of one exposure.
 #[derive(Debug, Clone)]
 pub(crate) struct ExtrafocalEmitter {
-    /// Emits the photons, with the whole extrafocal area as its focal spot.
+    /// Emits the photons, with the entire extrafocal area as its focal spot.
     pub emitter: Emitter,
     /// Share of the histories that are extrafocal: of all photons that pass the blades.
     pub share: f64,
-    /// Photons per solid angle over those of the focal spot, where the blades cover neither.
+    /// Photons per solid angle relative to those of the focal spot, where the blades cover neither.
     ratio: f64,
 }
 
 impl ExtrafocalEmitter {
-    /// The extrafocal radiation of a projection, if it has any; `focal` emits the photons of its focal spot.
+    /// The extrafocal radiation of a projection, if any; `focal` emits the photons of its focal spot.
     ///
     /// # Errors
-    /// [`ProjectionError`] as for [`Emitter::new`].
+    /// The same as [`Emitter::new`].
     pub fn beside(
         focal: &Emitter,
         projection: &Projection,
@@ -40,24 +40,24 @@ impl ExtrafocalEmitter {
         }))
     }
 
-    /// Histories of one mAs: photons of the focal spot and of what is `beside` it, if the spectrum came from the tube model.
+    /// Histories per mAs: photons of the focal spot and of `beside`, if the spectrum came from the tube model.
     pub fn histories_per_mas(focal: &Emitter, beside: Option<&Self>) -> Option<f64> {
         let share = beside.map_or(0.0, |beside| beside.share);
         Some(focal.photons_per_mas()? / (1.0 - share))
     }
 
-    /// Fluence per history with the collimator wide open, over that of the focal spot's photons per history of theirs.
+    /// Ratio of the fluence per history with the collimator fully open to that of the focal photons per focal history.
     pub fn open_over_focal(&self) -> f64 {
         (1.0 - self.share) * (1.0 + self.ratio)
     }
 
-    /// As [`ExtrafocalEmitter::open_over_focal`], at `depth` of the way from the middle of the focal spot to a point of the detector
-    /// plane, where the blades cover a part of the area.
+    /// The same as [`ExtrafocalEmitter::open_over_focal`], at `depth` of the way from the middle of the focal spot to a point of the
+    /// detector plane, where the blades cover a part of the area.
     pub fn lit_over_focal(&self, at: Point2<f64>, depth: f64) -> f64 {
         const POINTS: usize = 32;
         let spots = self.emitter.spot_points(POINTS);
         let lit = spots.iter().filter(|spot| {
-            // Where the ray through that point meets the detector plane.
+            // Intersection of the ray through that point with the detector plane.
             let end = at - spot.xy().coords * (1.0 / depth - 1.0);
             self.emitter.lights(spot, end)
         });
@@ -67,11 +67,11 @@ impl ExtrafocalEmitter {
 }
 
 impl Projection {
-    /// Histories of one mAs: photons that the tube sends into the field, extrafocal ones included. None if `spectrum` does not come from
-    /// the tube model, which alone knows.
+    /// Histories per mAs: photons that the tube emits into the field, including extrafocal ones. `None` if `spectrum` does not come from
+    /// the tube model, which is needed to know them.
     ///
     /// # Errors
-    /// [`ProjectionError`] when the exposure makes no sense.
+    /// [`ProjectionError`] if the exposure is invalid.
     pub fn photons_per_mas(&self, spectrum: &Spectrum) -> Result<Option<f64>, ProjectionError> {
         let focal = Emitter::new(self, spectrum)?;
         let beside = ExtrafocalEmitter::beside(&focal, self, spectrum)?;
@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    /// From the blades' opening all of the area is seen, from the detector plane a ninth of each side.
+    /// From the opening of the blades the entire area is visible, from the detector plane a ninth of each side.
     #[test]
     fn blades_cover_a_part_of_the_area() {
         let projection = projection(Some(Extrafocal::new(0.25, 30.0)));
@@ -133,7 +133,7 @@ mod tests {
         let lit = |depth| beside.lit_over_focal(Point2::origin(), depth) / (1.0 - beside.share);
         let expected = 1.0 + 0.25 / 81.0;
         assert!((lit(1.0) - expected).abs() < 2e-3, "{}", lit(1.0));
-        // At the blades: all of it.
+        // At the blades: the entire area.
         assert!((lit(0.25) - 1.25).abs() < 1e-12, "{}", lit(0.25));
     }
 }

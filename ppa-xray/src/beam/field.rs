@@ -29,7 +29,7 @@ impl Field {
         (0..2).all(|axis| (self.low_mm[axis]..=self.high_mm[axis]).contains(&at[axis]))
     }
 
-    /// What both rectangles share; nothing when they do not overlap.
+    /// Intersection of the two rectangles; `None` if they do not overlap.
     pub fn overlap(&self, other: &Self) -> Option<Self> {
         let low_mm = [0, 1].map(|axis| self.low_mm[axis].max(other.low_mm[axis]));
         let high_mm = [0, 1].map(|axis| self.high_mm[axis].min(other.high_mm[axis]));

@@ -7,16 +7,16 @@ use crate::beam::source::{HeelEffect, SpotPlane};
 use crate::beam::spectrum::Spectrum;
 use crate::beam::tube::{TubeSpec, anode_angles_deg};
 
-/// Largest step between the take-off angles whose spectra are kept, degrees.
+/// Largest step between the take-off angles of the stored spectra, degrees.
 const STEP_DEG: f64 = 0.5;
 
-/// Points per side of the field at which take-off angles are looked for.
+/// Points per side of the field at which take-off angles are evaluated.
 const LOOK: u32 = 33;
 
-/// Spectra of one tube by take-off angle; between two of them photons are mixed in proportion.
+/// Spectra of one tube by take-off angle; photons between two of them are mixed in proportion.
 ///
-/// The angle between a photon and the face of the anode is what the tube model calls the anode angle: it sets how much
-/// tungsten lies in the way. Towards the anode it shrinks. Below 1° and above 30° the model ends and its
+/// The angle between a photon and the face of the anode is the anode angle of the tube model; it determines the path
+/// length in tungsten, and decreases towards the anode. Outside the model's range of 1° to 30° the
 /// last spectrum is used.
 #[derive(Debug, Clone)]
 pub(crate) struct Heel {
@@ -26,19 +26,19 @@ pub(crate) struct Heel {
     first: f64,
     step: f64,
     pub spectra: Vec<Spectrum>,
-    /// Photons per solid angle of each spectrum over those of the central ray.
+    /// Photons per solid angle of each spectrum relative to those of the central ray.
     intensity: Vec<f64>,
     pub largest: f64,
 }
 
-/// Which spectra a direction draws from, and how many photons it gets.
+/// Spectra and intensity for a direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Mixture {
     /// The lower of the two spectra.
     pub lower: usize,
-    /// Share of the photons that come from the upper one.
+    /// Share of the photons from the upper one.
     pub upper_share: f64,
-    /// Photons per solid angle over those of the central ray.
+    /// Photons per solid angle relative to those of the central ray.
     pub intensity: f64,
 }
 
@@ -74,7 +74,7 @@ impl Heel {
         let steps = ((high - low).to_degrees() / STEP_DEG).ceil().max(1.0);
         let step = (high - low) / steps;
         let at_angle = |angle: f64| {
-            // Rounding of the angle may not leave the model.
+            // Rounding must not take the angle outside the model.
             let [lowest, highest] = anode_angles_deg();
             let anode_angle_deg = angle.to_degrees().clamp(lowest, highest);
             Spectrum::tungsten(&TubeSpec {
@@ -102,7 +102,7 @@ impl Heel {
         })
     }
 
-    /// What leaves in a direction (unit vector, device frame).
+    /// Spectra and intensity for a direction (unit vector, device frame).
     #[inline]
     pub fn mixture(&self, direction: &Vector3<f64>) -> Mixture {
         let angle = self.normal.dot(direction).asin();
@@ -123,7 +123,7 @@ impl Heel {
     }
 }
 
-/// Points all over a rectangle of the plane at `distance_mm`, its edges among them.
+/// Points on a lattice over a rectangle of the plane at `distance_mm`, edges included.
 pub(crate) fn lattice_on(low: [f64; 2], high: [f64; 2], distance_mm: f64) -> Vec<Point3<f64>> {
     let along = |axis: usize, i: u32| {
         low[axis] + (high[axis] - low[axis]) * f64::from(i) / f64::from(LOOK - 1)
@@ -144,9 +144,9 @@ mod tests {
     use crate::beam::projection::Projection;
     use crate::beam::source::Source;
 
-    /// 70 kV, 14° anode, 2.5 mm Al: photons per solid angle and mean energy beside the central ray over those on it,
+    /// 70 kV, 14° anode, 2.5 mm Al: photons per solid angle and mean energy off the central ray relative to those on it,
     /// against SpekPy 2.5.4 off its axis, `Spek(kvp=70, th=14, x=x, z=100).filter("Al", 2.5)`, times its squared
-    /// distance. SpekPy's beam passes the filter at a slant, which costs it up to 0.9 % at 17.6 cm; ours does not.
+    /// distance. SpekPy's beam passes the filter obliquely, which reduces it by up to 0.9 % at 17.6 cm; ours does not.
     #[test]
     fn heel_effect_agrees_with_spekpy_off_the_axis() {
         let source = Source {

@@ -9,24 +9,24 @@ use crate::beam::field::Field;
 use crate::beam::projection_error::ProjectionError;
 use crate::setters::setters;
 
-/// Width of the letter and of its strokes, over its height.
+/// Width of the letter and of its strokes, relative to its height.
 const WIDTH: f64 = 0.65;
 const STROKE: f64 = 0.17;
-/// Outer radius of the bowl of the R, over the height of the letter.
+/// Outer radius of the bowl of the R, relative to the height of the letter.
 const BOWL: f64 = 0.275;
 
-/// Points per side of a pixel at which it is looked whether the letter covers them.
+/// Sampling points per side of a pixel for the share that the letter covers.
 const POINTS: u32 = 16;
 
-/// An L or R of lead on the detector, upright with device y pointing down, to be read from the side of the source.
+/// A lead letter L or R on the detector, upright with device y pointing down, readable from the side of the source.
 ///
-/// No photon gets through: 2 mm of lead let 1e-12 through at 60 keV. X-rays of the lead itself are neglected, as are shadows on
-/// the patient, who lies before the letter.
+/// It lets no photon through: 2 mm of lead transmit 1e-12 at 60 keV. X-rays of the lead itself are neglected, as are shadows on
+/// the patient, who is in front of the letter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct SideMarker {
-    /// Side of the body that the letter stands for.
+    /// Side of the body that the letter names.
     pub side: Side,
     /// Middle of the letter in device x and y, mm from the foot of the perpendicular through the source.
     pub centre_mm: [f64; 2],
@@ -51,7 +51,7 @@ impl SideMarker {
         }
     }
 
-    /// Refuses letters of invalid size, and those whose middle is not on the detector.
+    /// Checks that the size of the letter is valid and that its middle is on the detector.
     ///
     /// # Errors
     /// [`ProjectionError::Marker`].
@@ -72,7 +72,7 @@ impl SideMarker {
         })
     }
 
-    /// Whether the letter covers a place of the detector plane, mm.
+    /// Whether the letter covers a point of the detector plane, mm.
     pub(crate) fn covers(&self, at: Point2<f64>) -> bool {
         let [u, v] = [0, 1].map(|axis| (at[axis] - self.centre_mm[axis]) / self.height_mm);
         let (right, bottom) = (0.5 * WIDTH, 0.5);
@@ -87,7 +87,7 @@ impl SideMarker {
             }
     }
 
-    /// The pixels that the letter covers in part or whole, and the shares of their areas.
+    /// Returns the pixels that the letter covers fully or in part, and the covered share of each pixel's area.
     pub(crate) fn covered(&self, detector: &Detector) -> Vec<(usize, f64)> {
         let size_mm = [WIDTH * self.height_mm, self.height_mm];
         let frame = Field::centred(self.centre_mm, size_mm);
@@ -114,7 +114,7 @@ impl SideMarker {
     }
 }
 
-/// The bowl of an R: two bars and half a ring, in heights of the letter from its middle.
+/// The bowl of an R: two bars and half a ring. Coordinates are relative to the middle of the letter, in units of its height.
 fn in_bowl(u: f64, v: f64) -> bool {
     let (u, v) = (u - (0.5 * WIDTH - BOWL), (v + 0.5 - BOWL).abs());
     let from_middle = if u < 0.0 { v } else { u.hypot(v) };
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(drawn(Side::Right), right.join("\n"));
     }
 
-    /// The area of an L is that of its two bars; the shares of pixels sum up to it.
+    /// The area of an L is that of its two bars; the covered shares of the pixels add up to it.
     #[test]
     fn shares_of_pixels_sum_up_to_the_letter() {
         let detector = Detector::centred(120, 100, 0.3);

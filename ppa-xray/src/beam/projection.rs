@@ -1,4 +1,4 @@
-//! Source, field and detector of one exposure, and where they stand in the CT.
+//! Source, field and detector of one exposure, and their pose relative to the CT.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
@@ -11,9 +11,9 @@ use crate::beam::receptor::Receptor;
 use crate::beam::source::{Collimation, Extrafocal, Source};
 use crate::setters::setters;
 
-/// One exposure: source, field and detector, and where they stand in the CT.
+/// One exposure: source, field and detector, and their pose relative to the CT.
 ///
-/// The device frame has the source (the middle of the focal spot) at the origin and z square to the detector plane.
+/// The device frame has the source (the middle of the focal spot) at the origin and z perpendicular to the detector plane.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Projection {
@@ -23,14 +23,14 @@ pub struct Projection {
     pub source_detector_mm: f64,
     /// The detector.
     pub detector: Detector,
-    /// Direction of the tube's central ray in the device frame; z unless the detector is tilted. The plane of the
-    /// focal spot and the heel effect go by it.
+    /// Direction of the tube's central ray in the device frame; z unless the detector is tilted. It defines the plane of the
+    /// focal spot and the geometry of the heel effect.
     pub central_ray: Unit<Vector3<f64>>,
     /// Focal spot, heel effect and collimation.
     pub source: Source,
     /// Grid and converter in the detector plane.
     pub receptor: Receptor,
-    /// Letter of lead on the detector.
+    /// Lead letter on the detector.
     pub marker: Option<SideMarker>,
 }
 
@@ -48,7 +48,7 @@ setters!(Projection {
 const MOST_PENUMBRA: f64 = 20.0;
 
 impl Projection {
-    /// A point source that sends photons evenly in solid angle, all to the detector, which takes all their energy.
+    /// A point source that emits photons uniformly in solid angle towards the detector, which absorbs all their energy.
     pub fn new(
         ct_from_device: Isometry3<f64>,
         source_detector_mm: f64,
@@ -65,9 +65,9 @@ impl Projection {
         }
     }
 
-    /// The same tube with the detector turned about its centre: first about device x, then about device y, radians.
+    /// The same tube with the detector rotated about its centre: first about device x, then about device y, radians.
     ///
-    /// The device frame turns with the detector; tube and patient stay where they are.
+    /// The device frame rotates with the detector; tube and patient do not move.
     #[must_use]
     pub fn with_detector_turned(&self, about_x: f64, about_y: f64) -> Self {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), about_y)
@@ -86,10 +86,10 @@ impl Projection {
         }
     }
 
-    /// Checks lengths and counts; what depends on the phantom is checked with the phantom.
+    /// Checks lengths and counts. Conditions that depend on the phantom are checked together with the phantom.
     ///
     /// # Errors
-    /// [`ProjectionError`] naming the number at fault.
+    /// [`ProjectionError`] naming the invalid number.
     pub fn validate(&self) -> Result<(), ProjectionError> {
         let Detector {
             columns,
@@ -200,13 +200,13 @@ impl Projection {
         Ok(())
     }
 
-    /// Refuses blades that leave no part of the field to the whole focal spot.
+    /// Checks that some part of the field sees the entire focal spot past the blades.
     fn check_blades(&self, field: &Field) -> Result<(), ProjectionError> {
         let Some(blades_mm) = self.source.blades_mm else {
             return Ok(());
         };
         let source_detector_mm = self.source_detector_mm;
-        // The edges of the field move by D/b − 1 per mm of the spot.
+        // The edges of the field shift by D/b − 1 per mm of the spot.
         let half_mm = 0.5 * field.size_mm()[0].min(field.size_mm()[1]);
         let reach_mm = self.source.focal_spot.shadow_reach_mm();
         let least_mm = source_detector_mm * reach_mm / (half_mm + reach_mm);
@@ -227,7 +227,7 @@ impl Projection {
     }
 
     /// Whether the pyramid from the source to the field can meet the convex hull of `corners`
-    /// (device frame): false when all lie outside one of its faces.
+    /// (device frame); false if all corners are outside one of its faces.
     pub(crate) fn field_may_meet(&self, corners: &[Point3<f64>]) -> bool {
         let Field { low_mm, high_mm } = self.field();
         let d = self.source_detector_mm;
@@ -251,7 +251,7 @@ impl Projection {
 mod tests {
     use super::*;
 
-    /// The detector turned about its centre: same solid angle weight, same centre, same tube.
+    /// The detector rotated about its centre: same solid angle weight, same centre, same tube.
     #[test]
     fn a_turned_detector_stays_where_it_is() {
         let detector = Detector::centred(10, 10, 40.0);

@@ -1,9 +1,9 @@
 //! Cells of the detector plane.
 
-/// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
+/// Largest number of pixels of a detector: 2²⁸, whose planes take 8 GiB.
 pub(crate) const MAX_PIXELS: usize = 1 << 28;
 
-/// A rectangle in the detector plane, cut into equal cells.
+/// A rectangle in the detector plane, divided into equal cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Raster {
     pub columns: usize,
@@ -23,7 +23,7 @@ impl Raster {
         self.extent_mm[0] * self.extent_mm[1] / 100.0 / self.cells() as f64
     }
 
-    /// Row-major cell under a point of the plane (device x, y in mm).
+    /// Row-major cell that contains a point of the plane (device x, y in mm).
     #[inline]
     pub fn cell_at(&self, x_mm: f64, y_mm: f64) -> Option<usize> {
         let column = ((x_mm - self.centre_mm[0]) / self.extent_mm[0] + 0.5) * self.columns as f64;
@@ -33,7 +33,7 @@ impl Raster {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// The place `step` cells from another along x and y. A step from inside the raster is reflected at its edges.
+    /// The point `step` cells from another along x and y. A step from inside the raster is reflected at its edges.
     pub fn moved(&self, from_mm: [f64; 2], step: [f64; 2]) -> [f64; 2] {
         if self.cell_at(from_mm[0], from_mm[1]).is_none() {
             return from_mm;
@@ -47,9 +47,9 @@ impl Raster {
         })
     }
 
-    /// Cells under a square about a point of the raster, and their shares; its side is `spot` cells, at most 1.
+    /// Cells covered by a square around a point of the raster, and their shares; its side is `spot` cells, at most 1.
     ///
-    /// What lies beyond the raster is folded back, as if it continued as its mirror image. None if the point lies outside.
+    /// The part beyond the raster is folded back at its edge. `None` if the point is outside.
     #[inline]
     pub fn cells_about(&self, x_mm: f64, y_mm: f64, spot: f64) -> Option<[(usize, f64); 4]> {
         self.cell_at(x_mm, y_mm)?;
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Steps inside the raster are steps; one across an edge is folded back, whatever its length.
+        /// A step inside the raster is unchanged; one across an edge is folded back, whatever its length.
         #[test]
         fn a_moved_photon_stays_in_the_raster(x in 0.0..6.0_f64, y in 0.0..4.0_f64, step in -30.0..30.0_f64) {
             let raster = Raster { columns: 12, rows: 8, centre_mm: [3.0, 2.0], extent_mm: [6.0, 4.0] };
@@ -95,7 +95,7 @@ mod tests {
             prop_assert_eq!(raster.moved([7.0, y], [step, 0.0]), [7.0, y]);
         }
 
-        /// Shares of a spread photon sum to 1, balance about it, and are those of the squares' overlap; beside an edge
+        /// The shares of a spread photon sum to 1, are balanced about it, and equal the overlap of the squares; next to an edge
         /// they fold back.
         #[test]
         fn a_spread_photon_is_shared_by_overlap(x in 0.0..6.0_f64, y in 0.0..4.0_f64, spot in 0.01..=1.0_f64) {

@@ -1,4 +1,4 @@
-//! The image receptor of an exposure, as a user describes it.
+//! User-facing description of the image receptor of an exposure.
 
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +31,7 @@ pub struct Receptor {
 }
 
 impl Default for Receptor {
-    /// A detector that takes the whole energy of every photon, in sharp pixels without noise of its own.
+    /// A detector that absorbs the entire energy of every photon, in sharp pixels without noise of its own.
     fn default() -> Self {
         Self {
             model: DetectorModel::default(),
@@ -69,8 +69,8 @@ pub(crate) fn is_first(panel: &u32) -> bool {
     *panel == 0
 }
 
-/// Spread of the signal in the converter: its modulation transfer function, without that of the pixels' aperture, which
-/// the image has by itself.
+/// Spread of the signal in the converter: its modulation transfer function, excluding the aperture of the pixels, which
+/// is already part of the image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -103,7 +103,7 @@ pub enum Blur {
 }
 
 impl Blur {
-    /// 1 / (1 + H f²) for signal and noise.
+    /// Returns the blur 1 / (1 + H f²) for signal and noise.
     #[must_use]
     pub fn lorentzian(h_mm2: f64) -> Self {
         Self::Lorentzian {
@@ -113,7 +113,7 @@ impl Blur {
     }
 }
 
-/// Energy that a photon leaves in the detector.
+/// Energy that a photon deposits in the detector.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -141,7 +141,7 @@ fn default_packing() -> f64 {
     0.8
 }
 
-/// A linear anti-scatter grid: thin absorbing strips with spacers between them.
+/// A linear anti-scatter grid: thin absorbing strips separated by spacers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -193,7 +193,7 @@ setters!(AntiScatterGrid {
 });
 
 impl AntiScatterGrid {
-    /// A moving grid with strips of 0.05 mm of lead along device y, spaces of aluminium and parallel strips, as plans assume by default.
+    /// A moving grid with parallel strips of 0.05 mm of lead along device y and aluminium spaces, the default of plans.
     #[must_use]
     pub fn new(ratio: f64, lines_per_cm: f64) -> Self {
         Self {
@@ -249,17 +249,17 @@ fn default_interspace() -> String {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReceptorError {
-    /// A number out of range.
+    /// A number is out of range.
     #[error("{what} is {found}, expected {expected}")]
     Number {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// What it was.
+        /// Value found.
         found: f64,
-        /// What it may be.
+        /// Allowed range.
         expected: &'static str,
     },
-    /// Strips as wide as their spacing.
+    /// The strips are as wide as their spacing or wider.
     #[error(
         "grid strips of {strip_mm} mm at {lines_per_cm} lines per cm leave no space between them: they repeat every {pitch_mm} mm"
     )]
@@ -271,55 +271,55 @@ pub enum ReceptorError {
         /// Distance from strip to strip.
         pitch_mm: f64,
     },
-    /// A table of an MTF or a noise transfer without pairs.
+    /// The frequencies and values of an MTF or noise transfer table are not in pairs.
     #[error(
         "the numbers of frequencies and values of the {curve} table are {frequencies} and {values}, expected equal numbers of at least 1"
     )]
     MtfTable {
-        /// MTF or noise transfer.
+        /// The MTF or the noise transfer.
         curve: &'static str,
         /// Number of frequencies.
         frequencies: usize,
         /// Number of values.
         values: usize,
     },
-    /// An MTF or noise transfer unlike that of a converter.
+    /// The MTF or noise transfer cannot be that of a converter.
     #[error(
         "the {curve} of {found} at {per_mm}/mm cannot be that of a converter, whose curve falls steadily: the nearest such curve has {nearest:.3} there"
     )]
     Mtf {
-        /// MTF, noise transfer, or the ratio of both.
+        /// The MTF, the noise transfer, or the ratio of both.
         curve: &'static str,
         /// Frequency, 1/mm.
         per_mm: f64,
-        /// Value there.
+        /// Value at that frequency.
         found: f64,
-        /// Value of the sum of Gaussians that comes nearest to the whole curve.
+        /// Value of the sum of Gaussians that is the best fit to the curve.
         nearest: f64,
     },
-    /// Noise that is blurred more than the signal.
+    /// The noise is blurred more than the signal.
     #[error(
         "the noise transfer of {noise} at {per_mm}/mm is below the MTF of {mtf} there, expected the MTF or more"
     )]
     NoiseBelowMtf {
         /// Frequency, 1/mm.
         per_mm: f64,
-        /// Noise transfer there.
+        /// Noise transfer at that frequency.
         noise: f64,
-        /// MTF there.
+        /// MTF at that frequency.
         mtf: f64,
     },
-    /// A material that is not in the library.
+    /// A material is not in the library.
     #[error("the grid's {part} is of an unknown material: {message}")]
     Material {
-        /// Strips or spaces.
+        /// Either the strips or the spaces.
         part: &'static str,
-        /// What the library said.
+        /// Message of the library.
         message: String,
     },
 }
 
-/// Refuses a number outside a range; NaN is outside.
+/// Returns an error for a number outside a range; NaN is outside.
 pub(crate) fn require(
     what: &'static str,
     found: f64,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::beam::field::Field;
 use crate::setters::setters;
 
-/// What distinguishes the tube from a point that emits the same photons in all directions.
+/// Differences of the tube from a point that emits the same photons in all directions.
 ///
 /// The default is that point, collimated to the detector.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub struct Source {
     pub heel_effect: Option<HeelEffect>,
 }
 
-/// The effective focal spot: as seen along the central ray, in a plane square to it.
+/// The effective focal spot: as seen along the central ray, in a plane perpendicular to it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
@@ -52,9 +52,9 @@ pub enum SpotShape {
     Gaussian,
 }
 
-/// Extrafocal (off-focal) radiation: photons from where electrons that the focal spot scattered back hit the anode again.
+/// Extrafocal (off-focal) radiation: photons from electrons that are scattered back from the focal spot and hit the anode again.
 ///
-/// They have the spectrum of the focal spot. The collimator blades, which stand away from the anode, let them out beyond the field as well.
+/// They have the spectrum of the focal spot. The collimator blades, at some distance from the anode, also let them out beyond the field.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -89,7 +89,7 @@ pub enum Collimation {
     },
 }
 
-/// Anode heel effect: photons that leave close to the anode's face lose more of themselves in it.
+/// Anode heel effect: photons that leave close to the anode's face are attenuated more by the anode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -98,10 +98,10 @@ pub struct HeelEffect {
     pub anode_towards_deg: f64,
 }
 
-/// A Gaussian of this full width at half maximum has the standard deviation 1: √(8 ln 2).
+/// Full width at half maximum of a Gaussian with standard deviation 1: √(8 ln 2).
 const FWHM_PER_SIGMA: f64 = 2.354_820_045_030_949;
 
-/// No standard normal number is farther from 0: random numbers come in steps of 2⁻³², and √(2 ln 2³²) is 6.66.
+/// Upper limit of the magnitude of a standard normal number: random numbers come in steps of 2⁻³², and √(2 ln 2³²) is 6.66.
 const WIDEST: f64 = 6.67;
 
 setters!(Source {
@@ -118,12 +118,12 @@ setters!(FocalSpot {
 });
 
 impl Extrafocal {
-    /// `ratio` times the photons of the focal spot, evenly from a square of the side `size_mm`.
+    /// Extrafocal radiation of `ratio` times the photons of the focal spot, uniform over a square of side `size_mm`.
     pub const fn new(ratio: f64, size_mm: f64) -> Self {
         Self { ratio, size_mm }
     }
 
-    /// The square.
+    /// The square that the extrafocal photons leave from.
     pub(crate) fn area(self) -> FocalSpot {
         FocalSpot {
             size_mm: self.size_mm,
@@ -133,7 +133,7 @@ impl Extrafocal {
 }
 
 impl HeelEffect {
-    /// The anode seen from the cathode: degrees from device x towards device y.
+    /// Takes the direction of the anode as seen from the cathode: degrees from device x towards device y.
     pub const fn new(anode_towards_deg: f64) -> Self {
         Self { anode_towards_deg }
     }
@@ -152,7 +152,7 @@ impl FocalSpot {
         }
     }
 
-    /// Largest offset along an axis that counts for penumbrae, mm: 2.7e-3 of a Gaussian spot lie beyond.
+    /// Largest offset along an axis that counts for penumbrae, mm; 2.7e-3 of a Gaussian spot is beyond it.
     pub(crate) fn shadow_reach_mm(&self) -> f64 {
         match self.shape {
             SpotShape::Uniform => 0.5 * self.size_mm,
@@ -160,7 +160,7 @@ impl FocalSpot {
         }
     }
 
-    /// Offset along two axes of the spot's plane, mm; a point draws nothing.
+    /// Samples an offset along two axes of the spot's plane, mm. A point uses no random numbers.
     #[inline]
     pub(crate) fn sample(&self, rng: &mut Philox) -> [f64; 2] {
         if self.is_point() {
@@ -173,8 +173,8 @@ impl FocalSpot {
     }
 
     /// Offsets along an axis of the spot's plane, mm: the medians of `count` equally strong strips, moved outwards until their
-    /// variance is that of the spot. The same in x and y, they stand for the spot with equal weights; for a point, and for
-    /// a single strip, its middle.
+    /// variance is that of the spot. Used in both x and y, they represent the spot with equal weights. A point or a single strip
+    /// gives the middle.
     pub(crate) fn strips_mm(&self, count: usize) -> Vec<f64> {
         if self.is_point() || count == 1 {
             return vec![0.0; count];
@@ -189,7 +189,7 @@ impl FocalSpot {
         line.iter().map(|at| spread_mm * at).collect()
     }
 
-    /// Share of the spot at smaller offsets along an axis.
+    /// Share of the spot at offsets below `offset_mm` along an axis.
     pub(crate) fn share_below(&self, offset_mm: f64) -> f64 {
         match self.shape {
             SpotShape::Uniform => (offset_mm / self.size_mm + 0.5).clamp(0.0, 1.0),
@@ -197,9 +197,9 @@ impl FocalSpot {
         }
     }
 
-    /// Offset along an axis of one of the strips of [`FocalSpot::strips_mm`] that divide the part of the spot from one share of it to another, mm.
+    /// Offset along an axis, mm, of one of the strips of [`FocalSpot::strips_mm`] when they divide the part of the spot between two shares.
     ///
-    /// Strips of a part of a Gaussian spot are at their medians, without the correction of the variance.
+    /// Strips of a part of a Gaussian spot are at their medians, without the variance correction.
     pub(crate) fn strip_of_part_mm(
         &self,
         [first, last]: [f64; 2],
@@ -230,7 +230,7 @@ impl FocalSpot {
     }
 }
 
-/// Where the cumulative normal distribution takes the given values, which ascend.
+/// Arguments at which the cumulative normal distribution takes the given, ascending values.
 fn gaussian_quantiles(shares: impl Iterator<Item = f64>) -> Vec<f64> {
     const STEP: f64 = 1.0 / 512.0;
     let (mut at, mut sum) = (-6.0, 0.0);
@@ -245,7 +245,7 @@ fn gaussian_quantiles(shares: impl Iterator<Item = f64>) -> Vec<f64> {
     shares.map(&mut reached).collect()
 }
 
-/// Where the cumulative normal distribution takes a value, by bisection.
+/// Argument at which the cumulative normal distribution takes a value, by bisection.
 fn normal_quantile(share: f64) -> f64 {
     let (mut low, mut high) = (-WIDEST, WIDEST);
     for _ in 0..32 {
@@ -284,14 +284,14 @@ impl Collimation {
     }
 }
 
-/// Where the focal spot lies in the device frame.
+/// Orientation of the focal spot in the device frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SpotPlane {
     pub axes: [Vector3<f64>; 2],
 }
 
 impl SpotPlane {
-    /// The plane square to the central ray; its axes are device x and y, tilted with the ray.
+    /// The plane perpendicular to the central ray; its axes are device x and y, tilted with the ray.
     pub fn square_to(central_ray: &Vector3<f64>) -> Self {
         let turn = nalgebra::UnitQuaternion::rotation_between(&Vector3::z(), central_ray)
             .unwrap_or_else(nalgebra::UnitQuaternion::identity);

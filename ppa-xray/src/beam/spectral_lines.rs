@@ -1,4 +1,4 @@
-//! Spectra as lines at common energies, to sum over.
+//! Spectra as lines at common energies, for sums over energy.
 
 use crate::beam::heel::Mixture;
 use crate::beam::spectrum::Spectrum;
@@ -7,15 +7,15 @@ use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 /// Spectra as lines at common energies.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SpectralLines {
-    /// Ascending.
+    /// Energies of the lines, ascending.
     pub energy_kev: Vec<f64>,
     /// Probability of every line, spectrum by spectrum.
     pub weights: Vec<Vec<f64>>,
 }
 
 impl SpectralLines {
-    /// The middles of the energy bins; those that hold less than 1e-9 of the photons, or that no photon is
-    /// followed at, are left out.
+    /// Midpoints of the energy bins; bins with less than 1e-9 of the photons, or at energies that are not
+    /// followed, are omitted.
     pub fn of(spectra: &[Spectrum]) -> Self {
         let followed = |energy_kev: &f64| (CUTOFF_KEV..=MAX_ENERGY_KEV).contains(energy_kev);
         let mut energy_kev: Vec<f64> = spectra
@@ -43,7 +43,7 @@ impl SpectralLines {
             weights,
         }
     }
-    /// Photons of every line in a mixture of two neighbouring spectra.
+    /// Photons per line in a mixture of two neighbouring spectra.
     #[inline]
     pub fn mixed(&self, mixture: Mixture) -> impl Iterator<Item = f64> {
         let last = self.weights.len() - 1;

@@ -8,12 +8,12 @@ use crate::{
     matter::material::Material,
 };
 
-/// Entries per bin of the table that says in which bin to start looking: the first is nearly always right.
+/// Entries per bin of the table that gives the first bin to search; the first is nearly always right.
 const GUIDE_PER_BIN: usize = 16;
 
 /// Photon energies in bins, uniform within each, as a probability distribution.
 ///
-/// May know the absolute fluence: photons per mAs and cm² at 1 m from the source.
+/// May have an absolute fluence: photons per mAs and cm² at 1 m from the source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spectrum {
     edges_kev: Vec<f64>,
@@ -21,15 +21,16 @@ pub struct Spectrum {
     cumulative: Vec<f64>,
     /// First bin whose cumulative probability exceeds k/len.
     guide: Vec<u32>,
-    /// The tube it came from, and its photons per mAs and cm² at 1 m.
+    /// The source tube, and its photons per mAs and cm² at 1 m.
     tube: Option<(TubeSpec, f64)>,
 }
 
 impl Spectrum {
-    /// Spectrum from n + 1 bin edges in keV and n weights; empty bins at both ends are dropped.
+    /// Builds a spectrum from n + 1 bin edges in keV and n weights. Empty bins at both ends are dropped.
     ///
     /// # Errors
-    /// Other than one edge more than weights; edges that do not ascend; weights that are negative or not finite, or all zero; a filled bin outside 1 to 150 keV.
+    /// A number of edges that is not the number of weights plus one; edges that do not ascend; weights that are negative, not finite
+    /// or all zero; a filled bin outside 1 to 150 keV.
     pub fn from_bins(edges_kev: &[f64], weights: &[f64]) -> Result<Self, SpectrumError> {
         if edges_kev.len() != weights.len() + 1 {
             return Err(SpectrumError::Count {
@@ -54,7 +55,7 @@ impl Spectrum {
         Self::from_checked_bins(edges_kev, weights)
     }
 
-    /// All photons at one energy.
+    /// A spectrum of one photon energy.
     ///
     /// # Errors
     /// An energy outside 1 to 150 keV.
@@ -70,7 +71,7 @@ impl Spectrum {
 
     fn from_checked_bins(edges_kev: &[f64], weights: &[f64]) -> Result<Self, SpectrumError> {
         let largest = weights.iter().copied().fold(0.0, f64::max);
-        // What an absorber leaves of the softest bins is zero to any detector, and may lie below the tables.
+        // The softest bins behind an absorber are zero to any detector, and may be below the tables.
         let filled = |weight: &f64| *weight > largest * 1e-30;
         let first = weights.iter().position(filled).ok_or(SpectrumError::Dark)?;
         let last = weights
@@ -82,7 +83,7 @@ impl Spectrum {
         if low_kev < MIN_ENERGY_KEV || high_kev > MAX_ENERGY_KEV {
             return Err(SpectrumError::Range { low_kev, high_kev });
         }
-        // Relative to the largest, so that the sum stays finite.
+        // Scaled by the largest so that the sum stays finite.
         let relative: Vec<f64> = weights[first..=last]
             .iter()
             .map(|weight| weight / largest)
@@ -115,7 +116,7 @@ impl Spectrum {
         self
     }
 
-    /// The tube that the spectrum came from, if it came from the tube model.
+    /// The tube that the spectrum was computed for, if it came from the tube model.
     #[must_use]
     pub fn tube(&self) -> Option<&TubeSpec> {
         self.tube.as_ref().map(|(tube, _)| tube)
@@ -129,7 +130,7 @@ impl Spectrum {
             .zip(self.probabilities.iter().copied())
     }
 
-    /// Edges of the bins in keV, one more than bins.
+    /// Edges of the bins in keV, one more than there are bins.
     #[must_use]
     pub fn edges_kev(&self) -> &[f64] {
         &self.edges_kev
@@ -141,7 +142,7 @@ impl Spectrum {
         self.edges_kev[self.edges_kev.len() - 1]
     }
 
-    /// Energy in keV of the photon that `u`, uniform in [0, 1), stands for: the inverse of the cumulative distribution.
+    /// Energy in keV at the cumulative probability `u`, uniform in [0, 1): the inverse of the cumulative distribution.
     #[inline]
     #[must_use]
     pub fn sample(&self, u: f64) -> f64 {
@@ -184,13 +185,13 @@ impl Spectrum {
         Some(1e6 * self.kerma_gy_cm2() * self.fluence_per_mas_cm2_at_1m()?)
     }
 
-    /// Aluminium that halves the air kerma, mm (narrow beam).
+    /// First half-value layer: thickness of aluminium that halves the air kerma, mm (narrow beam).
     #[must_use]
     pub fn hvl1_mm_al(&self) -> f64 {
         self.aluminium_for_kerma_fraction(0.5)
     }
 
-    /// Aluminium that halves the air kerma once more, mm.
+    /// Second half-value layer: thickness of aluminium that halves the air kerma once more, mm.
     #[must_use]
     pub fn hvl2_mm_al(&self) -> f64 {
         self.aluminium_for_kerma_fraction(0.25) - self.hvl1_mm_al()
@@ -206,7 +207,7 @@ impl Spectrum {
             .collect()
     }
 
-    /// Thickness of aluminium in mm that leaves `fraction` of the air kerma: the kerma falls steadily, so bisection finds it.
+    /// Thickness of aluminium in mm that leaves `fraction` of the air kerma. The kerma falls monotonically, so bisection finds it.
     fn aluminium_for_kerma_fraction(&self, fraction: f64) -> f64 {
         let aluminium = named("aluminium");
         let terms: Vec<(f64, f64)> = self

@@ -1,4 +1,4 @@
-//! What can be wrong with a spectrum.
+//! Errors of a spectrum.
 
 use std::path::PathBuf;
 
@@ -7,11 +7,11 @@ use crate::{
     matter::material_error::MaterialError,
 };
 
-/// Why something is not a spectrum.
+/// Why a spectrum is not valid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpectrumError {
-    /// Other than one edge more than weights.
+    /// The number of edges is not the number of weights plus one.
     #[error(
         "a spectrum has {edges} edges and {weights} weights, expected one edge more than weights"
     )]
@@ -24,7 +24,7 @@ pub enum SpectrumError {
     /// The tube voltage is outside the tube model.
     #[error("tube voltage {found} kV is outside the tube model, which covers {min} to {max} kV")]
     TubeVoltage {
-        /// Voltage asked for, kV.
+        /// Voltage given, kV.
         found: f64,
         /// Lowest voltage, kV.
         min: f64,
@@ -34,14 +34,14 @@ pub enum SpectrumError {
     /// The anode angle is outside the tube model.
     #[error("anode angle {found}° is outside the tube model, which covers {min}° to {max}°")]
     AnodeAngle {
-        /// Angle asked for, degrees.
+        /// Angle given, degrees.
         found: f64,
         /// Smallest angle, degrees.
         min: f64,
         /// Largest angle, degrees.
         max: f64,
     },
-    /// A filter whose thickness is negative or not finite.
+    /// The thickness of a filter is negative or not finite.
     #[error("filter of {material} has thickness {found_mm} mm, expected zero or more")]
     FilterThickness {
         /// Name of the filter's material.
@@ -49,26 +49,26 @@ pub enum SpectrumError {
         /// Thickness given, mm.
         found_mm: f64,
     },
-    /// A filter that is not written as `Material:thickness`.
+    /// A filter is not written as `Material:thickness`.
     #[error("cannot read filter {found:?}, expected Material:millimetres such as Al:2.5")]
     FilterSyntax {
         /// Text given.
         found: String,
     },
-    /// A filter of an unknown material, or an energy outside the cross-section tables.
+    /// The material of a filter is unknown, or an energy is outside the cross-section tables.
     #[error(transparent)]
     Material(#[from] MaterialError),
-    /// Bin edges that do not ascend.
+    /// The bin edges do not ascend.
     #[error("energy bin {bin} goes from {low_kev} to {high_kev} keV, expected ascending edges")]
     Edges {
         /// Index of the bin.
         bin: usize,
-        /// Its lower edge, keV.
+        /// Lower edge of the bin, keV.
         low_kev: f64,
-        /// Its upper edge, keV.
+        /// Upper edge of the bin, keV.
         high_kev: f64,
     },
-    /// A weight that is negative or not finite.
+    /// A weight is negative or not finite.
     #[error("energy bin {bin} has weight {found}, expected zero or more")]
     Weight {
         /// Index of the bin.
@@ -76,7 +76,7 @@ pub enum SpectrumError {
         /// Weight given.
         found: f64,
     },
-    /// Photons at energies without cross sections.
+    /// The spectrum has photons at energies without cross sections.
     #[error(
         "the spectrum has photons between {low_kev} and {high_kev} keV, expected photons from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV only"
     )]
@@ -86,7 +86,7 @@ pub enum SpectrumError {
         /// Upper edge of the highest filled bin, keV.
         high_kev: f64,
     },
-    /// No photon is left.
+    /// No photons are left.
     #[error("the spectrum has no photons")]
     Dark,
     /// A spectrum file cannot be used.
@@ -94,20 +94,20 @@ pub enum SpectrumError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong with the file.
         source: Box<SpectrumError>,
     },
     /// The file cannot be read.
     #[error("cannot be read")]
     Read(#[source] std::io::Error),
-    /// A line of a file that is not what it should be.
+    /// A line of the file is invalid.
     #[error("line {line}: found {found:?}, expected {expected}")]
     Line {
         /// Line number, from 1.
         line: usize,
         /// Text of the line.
         found: String,
-        /// What belongs there.
+        /// Expected content.
         expected: &'static str,
     },
 }

@@ -1,34 +1,34 @@
-//! Spectra from files: two-column CSV and MC-GPU's `.spc`.
+//! Spectrum files: two-column CSV and MC-GPU's `.spc`.
 
 use std::path::Path;
 
 use crate::{beam::spectrum::Spectrum, beam::spectrum_error::SpectrumError};
 
 impl Spectrum {
-    /// Reads `energy in keV, weight` lines, the energy being the centre of a bin; edges lie half-way between centres.
+    /// Reads lines of `energy in keV, weight`, where the energy is the centre of a bin; edges are half-way between centres.
     ///
-    /// Comma, semicolon, tab or blanks part the columns. Lines that are empty or begin with `#` are skipped, and so
+    /// The columns are separated by comma, semicolon, tab or blanks. Lines that are empty or begin with `#` are skipped, and so
     /// is one headline.
     ///
     /// # Errors
-    /// A file that cannot be read, a line that is not two numbers, fewer than two lines, and everything that
-    /// [`Spectrum::from_bins`] refuses.
+    /// A file that cannot be read, a line that is not two numbers, fewer than two lines, and the errors of
+    /// [`Spectrum::from_bins`].
     pub fn from_csv(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
         in_file(path.as_ref(), csv)
     }
 
-    /// Reads an MC-GPU spectrum: `lower bin edge in eV, weight` lines, ended by the upper edge with a negative weight.
-    /// One bin without width is a line.
+    /// Reads an MC-GPU spectrum: lines of `lower bin edge in eV, weight`, ended by the upper edge with a negative weight.
+    /// A single bin without width is a spectral line.
     ///
     /// # Errors
     /// A file that cannot be read, a line that does not begin with two numbers, no end, a negative weight after which
-    /// the energies rise further (MC-GPU would leave the rest out), and everything that [`Spectrum::from_bins`] refuses.
+    /// the energies rise further (MC-GPU would ignore the rest), and the errors of [`Spectrum::from_bins`].
     pub fn from_spc(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
         in_file(path.as_ref(), spc)
     }
 }
 
-/// Reads a file; whatever is wrong with it is reported with its name.
+/// Reads a file; errors name it.
 fn in_file(
     path: &Path,
     parse: impl FnOnce(&str) -> Result<Spectrum, SpectrumError>,
@@ -92,7 +92,7 @@ fn spc(text: &str) -> Result<Spectrum, SpectrumError> {
                 return Err(wrong_line(index, line, expected));
             }
             return match (&edges[..], &weights[..]) {
-                // How a line is written: a bin without width.
+                // Notation of a spectral line: a bin without width.
                 ([low, high], [weight]) if low == high && *weight > 0.0 => {
                     Spectrum::monoenergetic(*low)
                 }
@@ -108,7 +108,7 @@ fn spc(text: &str) -> Result<Spectrum, SpectrumError> {
     ))
 }
 
-/// Lines that say something, with their index.
+/// Lines with content, with their index.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = text.lines().map(str::trim).enumerate();
     lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
@@ -208,7 +208,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a file holds, reading ends in a spectrum or an error.
+        /// Reading any file returns a spectrum or an error.
         #[test]
         fn any_text_is_read_or_refused(text in "([-0-9.eNainf#, \n]{0,12}\n?){0,12}") {
             let file = file(&text);
@@ -216,7 +216,7 @@ mod tests {
             let _ = Spectrum::from_spc(file.path());
         }
 
-        /// The same of files that were sound once.
+        /// The same for valid files that were damaged.
         #[test]
         fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
             let csv = "keV,weight\n20.5,1\n21.5,3\n22.5,0\n23.5,2\n";

@@ -1,6 +1,6 @@
-//! Tungsten-anode x-ray tube: unfiltered spectra from a table, filtered by our own attenuation.
+//! Tungsten-anode x-ray tube: unfiltered spectra from a table, filtered by the cross sections of this crate.
 //!
-//! The table, made by `scripts/make_spectra.py` from SpekPy 2.5.4, keeps bremsstrahlung and characteristic lines apart;
+//! The table is made by `scripts/make_spectra.py` from SpekPy 2.5.4 and separates bremsstrahlung from characteristic lines;
 //! see `data/README.md`.
 
 use std::sync::OnceLock;
@@ -16,14 +16,14 @@ const LINE_EXPONENT: f64 = 1.63;
 /// A layer in the beam.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
-    /// What it is made of, at its nominal density.
+    /// Material, at its nominal density.
     pub material: Material,
     /// Thickness along the beam in mm.
     pub mm: f64,
 }
 
 impl Filter {
-    /// Fraction of photons of one energy that pass without interacting.
+    /// Fraction of photons of one energy that pass the filter without interacting.
     fn transmission(&self, energy_kev: f64) -> Result<f64, SpectrumError> {
         let mu_per_cm = self.material.total_cm2_g(energy_kev)? * self.material.density_g_cm3();
         Ok((-mu_per_cm * self.mm / 10.0).exp())
@@ -33,7 +33,7 @@ impl Filter {
 impl std::str::FromStr for Filter {
     type Err = SpectrumError;
 
-    /// Reads `Al:2.5`: a material of the library or an element symbol, and millimetres.
+    /// Parses text such as `Al:2.5`: a material of the library or an element symbol, and a thickness in millimetres.
     fn from_str(text: &str) -> Result<Self, SpectrumError> {
         let syntax = || SpectrumError::FilterSyntax {
             found: text.to_owned(),
@@ -47,7 +47,7 @@ impl std::str::FromStr for Filter {
     }
 }
 
-/// A tungsten-anode tube and what its beam passes before the phantom.
+/// A tungsten-anode tube and the filters of its beam.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TubeSpec {
@@ -60,7 +60,7 @@ pub struct TubeSpec {
 }
 
 impl TubeSpec {
-    /// A tube of `kvp` kV, its anode's face `anode_angle_deg` from the central beam, behind `filters`.
+    /// A tube of `kvp` kV with its anode face at `anode_angle_deg` from the central beam, behind `filters`.
     pub const fn new(kvp: f64, anode_angle_deg: f64, filters: Vec<Filter>) -> Self {
         Self {
             kvp,
@@ -75,7 +75,7 @@ impl Spectrum {
     ///
     /// Unfiltered spectra interpolate those of SpekPy 2.5.4 (model `casim`; Omar, Andreo, Poludniowski 2020,
     /// doi:10.1002/mp.14332) in voltage and angle; filters attenuate by the cross sections of this crate, narrow beam.
-    /// The fluence is that at 1 m; only an air filter makes it weaker by the air on the way.
+    /// The fluence is that at 1 m. It is attenuated by the air in between only if `filters` includes an air filter.
     ///
     /// # Errors
     /// A voltage outside 40 to 150 kV, an angle outside 1° to 30°, a filter whose thickness is negative or not finite,
@@ -137,7 +137,7 @@ struct Table {
     voltages: Vec<f64>,
     angles: Vec<f64>,
     lines: Vec<Line>,
-    /// Voltage by voltage, in each angle by angle.
+    /// Rows sorted by voltage, then by angle.
     rows: Vec<Row>,
 }
 
@@ -189,7 +189,7 @@ fn ends(nodes: &[f64]) -> [f64; 2] {
     [nodes[0], nodes[nodes.len() - 1]]
 }
 
-/// Interval of ascending `nodes` that holds `x`, and how far into it `x` lies on a logarithmic scale.
+/// Interval of ascending `nodes` that contains `x`, and the fraction of the interval below `x` on a logarithmic scale.
 fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {
     let lower = nodes
         .partition_point(|&node| node <= x)

@@ -1,4 +1,4 @@
-//! Energy that a photon deposits in a converter layer: its mean and its mean square.
+//! Mean and mean square of the energy that a photon deposits in a converter layer.
 
 use crate::beam::receptor::{DetectorModel, Receptor, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;
@@ -15,10 +15,10 @@ const DEPTHS: usize = 12;
 
 /// Response of a homogeneous layer by energy and incidence.
 ///
-/// A photon interacts at a depth that Beer–Lambert gives and leaves its energy there, but for a K x-ray or a Compton
-/// photon that gets out. Where one of these interacts again, its energy stays but for a K x-ray in turn, whose way
-/// out is taken from the depth of the first interaction. Rayleigh scattering does not stop a photon and is left out
-/// of the attenuation.
+/// A photon interacts at a depth given by Beer–Lambert and deposits its energy there, except for a K x-ray or a Compton
+/// photon that escapes. If one of these interacts again, its energy is deposited except for another K x-ray, whose escape
+/// is computed from the depth of the first interaction. Rayleigh scattering does not stop a photon and is excluded from
+/// the attenuation.
 #[derive(Debug, Clone)]
 pub(crate) struct Absorption {
     nodes: EnergyNodes,
@@ -27,10 +27,10 @@ pub(crate) struct Absorption {
 }
 
 impl Absorption {
-    /// None for the ideal detector, which keeps everything.
+    /// `None` for the ideal detector, which absorbs everything.
     ///
     /// # Errors
-    /// [`ReceptorError`] naming a thickness, packing or Swank factor out of range.
+    /// [`ReceptorError`] naming a thickness, packing or Swank factor that is out of range.
     pub fn of(receptor: &Receptor) -> Result<Option<Self>, ReceptorError> {
         let swank = receptor.collection_swank;
         let what = "the Swank factor of the collection of light or charge";
@@ -55,7 +55,7 @@ impl Absorption {
         };
         require(what, swank, 0.1..=1.0, "0.1 to 1")?;
         let mut absorption = Self::of_layer(&layer);
-        // ⟨ε²⟩ of every deposit grows by the spread of its collection.
+        // The spread of the collection increases ⟨ε²⟩ of every deposit.
         for [_, square] in absorption.shares.as_flattened_mut() {
             *square /= swank;
         }
@@ -86,7 +86,7 @@ impl Absorption {
         (0..=COSINES).map(|i| i as f64 / COSINES as f64)
     }
 
-    /// Interval of [`Absorption::cosines`] that holds a cosine, and how far into it the cosine lies.
+    /// Interval of [`Absorption::cosines`] that contains a cosine, and the position of the cosine in it.
     #[inline]
     pub fn column(cos: f64) -> (usize, f64) {
         let at = cos.clamp(0.0, 1.0) * COSINES as f64;
@@ -94,7 +94,7 @@ impl Absorption {
         (column, at - column as f64)
     }
 
-    /// Moments of the energy left by a photon that comes in at `cos` to the normal.
+    /// Moments of the energy deposited by a photon that arrives at `cos` to the normal.
     #[inline]
     pub fn moments(&self, energy_kev: f64, cos: f64) -> Moments {
         let (node, t) = self.nodes.locate(energy_kev);
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// The Swank factor of the collection multiplies that of the absorption, and leaves the signal.
+    /// The Swank factor of the collection multiplies that of the absorption and does not change the signal.
     #[test]
     fn collection_adds_its_noise() {
         let receptor = Receptor::default().with_model(DetectorModel::Selenium {
@@ -172,7 +172,7 @@ mod tests {
             .unwrap()
     }
 
-    /// Below the K edges nothing of note gets out: what is left is absorption, E (1 − exp(−μ t / cos)). Densities and
+    /// Below the K edges almost nothing escapes, so only absorption remains, E (1 − exp(−μ t / cos)). Densities and
     /// units are computed here: 200 µm, of which four fifths are crystal of 4.51 g/cm³, and 50 µm of selenium of 4.28 g/cm³.
     #[test]
     fn below_the_edge_a_layer_absorbs_as_beer_and_lambert_say() {
@@ -194,7 +194,7 @@ mod tests {
     }
 
     /// The tabulated layer against photons followed one by one, with flights, K x-rays and Compton scattering
-    /// sampled by code of this test (Klein–Nishina by rejection, Rayleigh left out as in the table), secondaries followed to the end.
+    /// sampled by code of this test (Klein–Nishina by rejection, no Rayleigh as in the table), secondaries followed to the end.
     #[test]
     fn a_layer_leaves_what_photons_followed_one_by_one_leave() {
         for (energy_kev, cos, material, solid_um, absorption) in [
@@ -222,7 +222,7 @@ mod tests {
                 "{energy_kev} keV: {mean:.3} ± {error:.3}, table {:.3}; {mean_square:.1} ± {error_square:.1}, table {:.1}",
                 table.mean_kev, table.square_kev2
             );
-            // 4 sigma (6e-5 each), and 0.4 % for what the table simplifies: with 200 000 photons it is 0.2 to 0.4 % high.
+            // 4 sigma (6e-5 each), and 0.4 % for the simplifications of the table: with 200 000 photons it is 0.2 to 0.4 % high.
             assert!((mean - table.mean_kev).abs() < 4.0 * error + 0.004 * mean);
             assert!(
                 (mean_square - table.square_kev2).abs() < 4.0 * error_square + 0.004 * mean_square
@@ -230,7 +230,7 @@ mod tests {
         }
     }
 
-    /// Energy left by one photon and all it sets free.
+    /// Energy deposited by one photon and its secondaries.
     fn follow(layer: &Layer, energy_kev: f64, cos: f64, rng: &mut Philox) -> f64 {
         let mut left = 0.0;
         let mut flying = vec![(0.0, cos, energy_kev)];
@@ -273,9 +273,9 @@ mod tests {
 
     /// Absorption times Swank factor of a whole beam against measured DQE at low frequency.
     ///
-    /// 0.6 mm of structured CsI, 70 kV, 19 mm Al added: 78 % at 0.15/mm (Samei, Med. Phys. 30 (2003) 1747). Light that is
-    /// not collected evenly costs a real layer up to a tenth more (Swank factors of 0.91 and 0.93 below the K edge, where
-    /// K x-rays play no part: Zhao, Ristić, Rowlands, Med. Phys. 31 (2004) 2594), so ours must lie above.
+    /// 0.6 mm of structured CsI, 70 kV, 19 mm Al added: 78 % at 0.15/mm (Samei, Med. Phys. 30 (2003) 1747). Uneven collection of
+    /// light costs a real layer up to a tenth more (Swank factors of 0.91 and 0.93 below the K edge, where
+    /// K x-rays play no part: Zhao, Ristić, Rowlands, Med. Phys. 31 (2004) 2594), so ours must be higher.
     #[test]
     fn dqe_of_csi_is_that_of_measured_layers_but_for_their_light() {
         let filters = vec!["Al:2.5".parse().unwrap(), "Al:19".parse().unwrap()];

@@ -1,15 +1,16 @@
-//! Blur of a converter: how light spreads over the pixels, in the signal and in its noise.
+//! Blur of a converter: spread of light over the pixels, in the signal and in its noise.
 //!
-//! A photon's light spreads by the converter's MTF T and is gathered by square pixels. The signal of a structure that the
-//! pixels resolve is thus multiplied by T, the pixels' aperture being in the image already, and the power spectrum of the
-//! noise of photons that are independent of each other is that of white noise times
+//! A photon's light is spread by the converter's MTF T and collected by square pixels. The signal of a structure that the
+//! pixels resolve is thus multiplied by T, as the pixels' aperture is already part of the image. The noise power spectrum of
+//! independent photons is that of white noise times
 //!
 //! Σ T²(f + k) sinc²(fx + kx) sinc²(fy + ky) over all k, f in cycles per pixel.
 //!
-//! Blurring pixels that have counted whole photons would give T² instead, too much noise below the Nyquist frequency: an image whose noise is drawn
-//! has noise and signal spread separately, and one whose photons are counted has each photon spread over a small square first.
+//! Blurring pixels that have counted entire photons would give T² instead, which is too much noise below the Nyquist frequency. So an
+//! image whose noise is drawn has noise and signal spread separately, and in one whose photons are counted each photon is first spread
+//! over a small square.
 //!
-//! Where the blur depends on the depth of the interaction, noise is blurred less than the signal: by N in place of T in the sum above, see
+//! If the blur depends on the depth of the interaction, noise is blurred less than the signal: by N instead of T in the sum above, see
 //! [`Lubberts`].
 
 use std::f64::consts::TAU;
@@ -27,16 +28,16 @@ use crate::detector::mtf::{Mtf, sinc};
 #[serde(deny_unknown_fields)]
 pub(crate) struct Spread {
     mtf: Mtf,
-    /// How noise differs from the signal; none where it does not.
+    /// Difference between noise and signal; `None` if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     lubberts: Option<Lubberts>,
-    /// Side of the square over which photons that are counted are spread, in pixels; at most 1.
+    /// Side of the square over which counted photons are spread, in pixels; at most 1.
     spot_pixels: f64,
 }
 
 impl Spread {
     /// # Errors
-    /// [`ReceptorError`] for numbers that make no sense, and for a curve that is not that of a converter.
+    /// [`ReceptorError`] for invalid numbers, and for a curve that is not that of a converter.
     pub fn of(blur: &Blur, pixel_mm: f64) -> Result<Self, ReceptorError> {
         let mtf = Mtf::of(blur, pixel_mm)?;
         let lubberts = Lubberts::of(blur, pixel_mm)?;
@@ -49,7 +50,7 @@ impl Spread {
         })
     }
 
-    /// Side of the square over which photons that are counted are spread, in pixels.
+    /// Side of the square over which counted photons are spread, in pixels.
     pub fn spot_pixels(&self) -> f64 {
         self.spot_pixels
     }
@@ -59,7 +60,7 @@ impl Spread {
         self.mtf.at(frequency)
     }
 
-    /// How photons are displaced before they are counted; none where they are not.
+    /// Displacement of photons before they are counted; `None` if they are not displaced.
     pub fn displacement(&self) -> Option<&Displacement> {
         self.lubberts
             .as_ref()
@@ -71,18 +72,18 @@ impl Spread {
         Kernel::of_transfer(self.reach(), |f| self.mtf.plane(f))
     }
 
-    /// The kernel from the expected signal of pixels to what they count of displaced photons; none where photons are not displaced.
+    /// The kernel from the expected signal of pixels to their counts of displaced photons; `None` if photons are not displaced.
     pub fn of_displacement(&self) -> Option<Kernel> {
         let displacement = self.displacement()?;
         Some(Kernel::of_transfer(self.reach(), |f| displacement.plane(f)))
     }
 
-    /// The kernel that turns white noise into that of the detector.
+    /// The kernel that converts white noise to that of the detector.
     pub fn of_white_noise(&self) -> Kernel {
         Kernel::of_transfer(self.reach(), |f| self.noise().noise_power(f).map(f64::sqrt))
     }
 
-    /// The kernel for pixels that have counted photons spread over the spot, and the one for the squares they counted.
+    /// The kernel for pixels that have counted photons spread over the spot, and the kernel for the squares they counted.
     pub fn of_counts(&self) -> [Kernel; 2] {
         let spot = |f: f64| sinc(self.spot_pixels * f);
         let kernel = Kernel::of_transfer(self.reach(), |f| {
@@ -94,14 +95,14 @@ impl Spread {
         [kernel, squares]
     }
 
-    /// The transfer of a photon's light, the same for all photons, after their displacement.
+    /// Transfer of a photon's light, the same for all photons, after their displacement.
     fn noise(&self) -> &Mtf {
         self.lubberts
             .as_ref()
             .map_or(&self.mtf, |lubberts| &lubberts.noise)
     }
 
-    /// Where kernels end. Their transfer functions have a kink at Nyquist, so they continue a little beyond the light.
+    /// Radius of the kernels. Their transfer functions have a kink at Nyquist, so they extend slightly beyond the light.
     fn reach(&self) -> usize {
         self.mtf.reach().max(12)
     }
@@ -110,7 +111,7 @@ impl Spread {
 /// Frequencies along each axis at which the variance of a pixel is summed.
 const FREQUENCIES: usize = 32;
 
-/// The side of the spot that gives pixels the variance of the detector: 0 for a sharp one, 1 at most.
+/// Side of the spot for which pixels have the variance of the detector: from 0, a sharp spot, to 1.
 fn spot_with_the_right_variance(mtf: &Mtf) -> f64 {
     let frequencies = frequencies(FREQUENCIES);
     let expected = mtf.noise_power(&frequencies).mean();
@@ -128,8 +129,8 @@ fn spot_with_the_right_variance(mtf: &Mtf) -> f64 {
 
 /// Noise power of photons that are spread over a spot, counted by pixels, and blurred by T over the spot's MTF.
 ///
-/// Two pixels share photons as the triangle of a pixel with itself, smoothed by that of the spot of side w, says at their
-/// distance: 1 − w/3 for the same, w/6 for neighbours.
+/// The photons shared by two pixels follow from the triangle of a pixel with itself, smoothed by that of the spot of side w:
+/// 1 − w/3 for the same pixel, w/6 for neighbours.
 fn counted_power(mtf: &Mtf, spot: f64, frequencies: &[f64]) -> DMatrix<f64> {
     let along = |f: f64| (1.0 - spot / 3.0 * (1.0 - (TAU * f).cos())) / sinc(spot * f).powi(2);
     let plane = mtf.plane(frequencies);
@@ -143,7 +144,7 @@ mod tests {
     use super::*;
 
     /// Spread photons have the noise power of the detector: the variance of a pixel to 1 %, and the power at every frequency
-    /// to 3 % for blurs that a spot of a pixel suffices for; for stronger ones up to 12 % too much, where little is left.
+    /// to 3 % for blurs for which a spot of a pixel is sufficient; for stronger ones up to 12 % too much, where little is left.
     #[test]
     fn counted_photons_have_nearly_the_noise_power_of_the_detector() {
         for (h_mm2, pixel_mm, most) in [
@@ -175,7 +176,7 @@ mod tests {
         }
     }
 
-    /// Kernels have the sums of squares that their powers have.
+    /// The sums of squares of the kernels agree with their powers.
     #[test]
     fn kernels_have_the_gain_of_their_power() {
         let spread = Spread::of(&Blur::lorentzian(0.45), 0.3).unwrap();

@@ -1,4 +1,4 @@
-//! Whether a receptor can be simulated, without simulating it.
+//! Checks a receptor without simulating it.
 
 use crate::beam::detector::Detector;
 use crate::beam::receptor::{Receptor, ReceptorError};
@@ -6,10 +6,10 @@ use crate::detector::readout::Readout;
 use crate::detector::response::Response;
 
 impl Receptor {
-    /// Checks the receptor on a detector, as both engines do before they begin.
+    /// Checks the receptor on a detector, as both engines do first.
     ///
     /// # Errors
-    /// [`ReceptorError`] naming the number, curve or material at fault.
+    /// [`ReceptorError`] naming the invalid number, curve or material.
     pub fn check(&self, detector: &Detector) -> Result<(), ReceptorError> {
         Readout::new(self, detector)?;
         Response::new(self, detector.centre_mm).map(drop)

@@ -5,10 +5,10 @@ use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 /// Smallest and largest energy that reach a detector, keV.
 const RANGE_KEV: [f64; 2] = [MIN_ENERGY_KEV, MAX_ENERGY_KEV];
 
-/// Ratio of neighbouring nodes: linear interpolation of E⁻³ is right to 6e-4 in between.
+/// Ratio of neighbouring nodes; linear interpolation of E⁻³ is accurate to 6e-4.
 const RATIO: f64 = 1.02;
 
-/// Relative distance from an absorption edge of the two nodes around it; tables of different origin place an edge within less than this.
+/// Relative distance from an absorption edge of the two nodes around it; the edges of different tables differ by less.
 const EDGE_GAP: f64 = 2e-5;
 
 /// Cells per keV of the guide.
@@ -19,7 +19,7 @@ const CELLS_PER_KEV: f64 = 2.0;
 pub(crate) struct EnergyNodes {
     kev: Vec<f64>,
     edges_kev: Vec<f64>,
-    /// Interval of nodes that holds the lower end of every cell of the guide.
+    /// Interval of nodes that contains the lower end of every cell of the guide.
     guide: Vec<u16>,
 }
 
@@ -62,7 +62,7 @@ impl EnergyNodes {
         &self.edges_kev
     }
 
-    /// Interval that holds an energy and how far into it the energy lies; energies outside go to the ends.
+    /// Interval that contains an energy, and the position of the energy in it; energies outside go to the ends.
     #[inline]
     pub fn locate(&self, energy_kev: f64) -> (usize, f64) {
         let [low, high] = RANGE_KEV;

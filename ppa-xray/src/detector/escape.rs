@@ -8,14 +8,14 @@ use crate::detector::quadrature::e2;
 /// Points of the integral over the azimuth of Compton scattering.
 const AZIMUTHS: usize = 6;
 
-/// A K x-ray, sent out evenly in all directions.
+/// A K x-ray, emitted isotropically.
 pub(crate) struct KRay {
-    /// Per interaction of the photon it comes from.
+    /// Probability per interaction of the photon that causes it.
     probability: f64,
     energy_kev: f64,
     /// Optical thickness of the layer for it.
     thickness: f64,
-    /// K x-rays of lighter elements where it interacts again.
+    /// K x-rays of lighter elements emitted where it interacts again.
     next: Vec<KRay>,
 }
 
@@ -34,7 +34,7 @@ impl KRay {
             .collect()
     }
 
-    /// Probability to get out from a depth (share of the layer).
+    /// Probability of escape from a depth (share of the layer).
     fn escape(&self, depth: f64) -> f64 {
         0.5 * (e2(self.thickness * depth) + e2(self.thickness * (1.0 - depth)))
     }
@@ -42,7 +42,7 @@ impl KRay {
 
 /// Compton scattering by one angle.
 pub(crate) struct Scattered {
-    /// Per interaction.
+    /// Probability per interaction.
     pub probability: f64,
     pub cos: f64,
     pub energy_kev: f64,
@@ -51,7 +51,7 @@ pub(crate) struct Scattered {
 }
 
 impl Scattered {
-    /// Probability to get out from a depth after incidence at `cos`, mean over the azimuth.
+    /// Probability of escape from a depth after incidence at `cos`, averaged over the azimuth.
     pub fn escape(&self, depth: f64, cos: f64) -> f64 {
         let sines = (1.0 - cos * cos).sqrt() * (1.0 - self.cos * self.cos).sqrt();
         let out = (0..AZIMUTHS).map(|azimuth| {
@@ -64,7 +64,7 @@ impl Scattered {
     }
 }
 
-/// What gets away, relative to the photon that came in.
+/// Escaping energy, relative to the incident photon.
 #[derive(Default)]
 pub(crate) struct Loss {
     pub energy: f64,
@@ -73,13 +73,13 @@ pub(crate) struct Loss {
 }
 
 impl Loss {
-    /// A share of the energy gets away with a probability and leaves the rest.
+    /// Adds the escape of a share of the energy, with a probability; the rest is deposited.
     pub fn add(&mut self, probability: f64, share: f64) {
         self.energy += probability * share;
         self.square += probability * share * (2.0 - share);
     }
 
-    /// K x-rays set free at a depth get away, or those that follow them.
+    /// Adds the escape of K x-rays emitted at a depth, or of those that follow them.
     pub fn add_k_rays(&mut self, probability: f64, rays: &[KRay], depth: f64, incident_kev: f64) {
         for ray in rays {
             let sent = probability * ray.probability;

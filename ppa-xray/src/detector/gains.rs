@@ -1,4 +1,4 @@
-//! Gains of the pixels of a panel, as flat-field calibration leaves them.
+//! Gains of the pixels of a panel after flat-field calibration.
 
 use ppa_core::random::Philox;
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::beam::receptor::{Receptor, ReceptorError, is_first, is_zero, require};
 use crate::transport::stream::Stream;
 
-/// Gains by panel and pixel: normal about 1, cut at [`CUT`] standard deviations.
+/// Gains by panel and pixel: normally distributed about 1, cut at [`CUT`] standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct Gains {
@@ -17,12 +17,12 @@ pub(crate) struct Gains {
     panel: u32,
 }
 
-/// Gains of the largest error stay above 0.2; the cut takes 0.05 % of the standard deviation.
+/// Cut of the distribution. Gains of the largest error stay above 0.2; the cut reduces the standard deviation by 0.05 %.
 const CUT: f64 = 4.0;
 
 impl Gains {
     /// # Errors
-    /// [`ReceptorError::Number`] for an error out of range.
+    /// [`ReceptorError::Number`] for an error that is out of range.
     pub fn of(receptor: &Receptor) -> Result<Self, ReceptorError> {
         let what = "the relative standard deviation of the pixels' gains";
         require(what, receptor.gain_error, 0.0..=0.2, "0 to 0.2")?;
@@ -51,7 +51,7 @@ impl Gains {
         }
     }
 
-    /// Multiplies row-major pixels by `power` factors of their gain.
+    /// Multiplies row-major pixels by the given power of their gain.
     pub fn apply(&self, plane: &mut [f32], power: i32) {
         if self.are_even() {
             return;
@@ -74,7 +74,7 @@ mod tests {
         plane
     }
 
-    /// 200 000 pixels: the mean within 4.5 standard errors of 1, the standard deviation within 4.5 of its own, 1/√2n; panels share nothing.
+    /// 200 000 pixels: the mean within 4.5 standard errors of 1, the standard deviation within 4.5 of its own, 1/√2n; panels differ.
     #[test]
     fn gains_are_normal_about_1_and_differ_by_panel() {
         let n = 200_000.0_f64;

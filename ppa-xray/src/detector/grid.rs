@@ -8,30 +8,30 @@ use crate::detector::strip_pattern::{StripPattern, Strips};
 use crate::matter::material::Material;
 use crate::vector_math::exp;
 
-/// A grid ready to be asked, with its attenuation by energy.
+/// An anti-scatter grid with its attenuation by energy.
 ///
-/// In a frame sheared along its strips the grid is upright. A photon that crosses it moves sideways by Δ, evenly over the
-/// strips' phase. Of Δ it spends n whole periods, each with one strip thickness d in lead, and a rest δ whose overlap o
-/// with the strips is a trapezoid of the phase; the mean of exp(−κ o) over it has a closed form. The idea of averaging
-/// over the phase is that of Day and Dance, Phys. Med. Biol. 28 (1983) 1429.
+/// In a frame sheared along its strips the grid is upright. A photon that crosses it moves sideways by Δ, with a uniform
+/// strip phase. Δ consists of n full periods, each with one strip thickness d in lead, and a rest δ whose overlap o
+/// with the strips is a trapezoidal function of the phase; the mean of exp(−κ o) over the phase has a closed form. Averaging
+/// over the phase follows Day and Dance, Phys. Med. Biol. 28 (1983) 1429.
 #[derive(Debug, Clone)]
 pub(crate) struct Grid {
     height_mm: f64,
     strips: Strips,
     moving: bool,
-    /// 1/distance of the focal line, 1/mm; 0 for parallel strips.
+    /// Inverse of the distance of the focal line, 1/mm; 0 for parallel strips.
     convergence_per_mm: f64,
-    /// Axis across the strips, and the grid's centre on it.
+    /// Axis across the strips, and the position of the grid's centre on it.
     across: usize,
     centre_mm: f64,
     nodes: EnergyNodes,
-    /// 1/mm of strip and interspace, by energy node.
+    /// Attenuation of strip and interspace, 1/mm, by energy node.
     attenuation: Vec<[f64; 2]>,
 }
 
 impl Grid {
     /// # Errors
-    /// [`ReceptorError`] naming the number or material at fault.
+    /// [`ReceptorError`] naming the invalid number or material.
     pub fn new(grid: &AntiScatterGrid, centre_mm: [f64; 2]) -> Result<Self, ReceptorError> {
         require("the grid ratio", grid.ratio, 0.0..=100.0, "0 to 100")?;
         let lines = "the number of grid lines per cm";
@@ -92,7 +92,7 @@ impl Grid {
         })
     }
 
-    /// Absorption edges of strips and spaces.
+    /// Absorption edges of strips and interspace.
     pub fn edges_kev(&self) -> &[f64] {
         self.nodes.edges_kev()
     }
@@ -110,7 +110,7 @@ impl Grid {
         self.moving
     }
 
-    /// Axis of the device across the strips.
+    /// Device axis across the strips.
     pub fn across(&self) -> usize {
         self.across
     }
@@ -119,32 +119,34 @@ impl Grid {
         self.strips.pitch_mm
     }
 
-    /// Length of a way through the grid.
+    /// Path length through the grid.
     pub fn way_mm(&self, direction: &Vector3<f64>) -> f64 {
         self.height_mm / direction.z
     }
 
-    /// How far photons move across the strips, in the frame where these are upright.
+    /// Movement of photons across the strips, in the frame where these are upright.
     #[inline]
     fn signed_sideways_mm(&self, at_mm: [f64; 2], direction: &Vector3<f64>) -> f64 {
         let lean = (at_mm[self.across] - self.centre_mm) * self.convergence_per_mm;
         self.height_mm * (direction[self.across] / direction.z - lean)
     }
 
-    /// The move of photons across the strips, at least one too small to matter: along the strips attenuation per sideways move is infinite and the move zero.
+    /// Size of the movement across the strips, with a negligible lower limit: for photons along the strips the movement is zero and the
+    /// attenuation per movement infinite.
     #[inline]
     fn sideways_mm(&self, signed_mm: f64) -> f64 {
         signed_mm.abs().max(1e-9 * self.strips.pitch_mm)
     }
 
-    /// Where photons that cross the detector plane at device (x, y) and move sideways by `signed_mm` have moved to, as if they moved to higher values; from the grid's
-    /// centre, which is that of a strip. The grid ends at the detector plane.
+    /// Exit position of photons that cross the detector plane at device (x, y) and move sideways by `signed_mm`, with the direction
+    /// reversed where needed so that they move to higher values; relative to the grid's centre, which is that of a strip. The grid ends
+    /// at the detector plane.
     #[inline]
     fn exit_mm(&self, at_mm: [f64; 2], signed_mm: f64) -> f64 {
         at_mm[self.across] - self.centre_mm + (-signed_mm).max(0.0)
     }
 
-    /// Probability to pass a stationary grid without interacting; attenuations in 1/mm.
+    /// Probability of passing a stationary grid without interaction; attenuations in 1/mm.
     #[inline]
     pub fn transmission_in_place(
         &self,
@@ -159,8 +161,8 @@ impl Grid {
         (-self.way_mm(direction) * (space + share * (strip - space))).exp()
     }
 
-    /// Shadow of the strips of a stationary grid in photons that cross the plane about device (x, y) in one direction over a way of `way_mm`, and where those
-    /// photons lie on it. Attenuation by the spaces is left out.
+    /// Shadow of the strips of a stationary grid for photons that cross the plane around device (x, y) in one direction over a path of
+    /// `way_mm`, and the position of those photons in it. Attenuation by the interspace is not included.
     pub fn pattern(
         &self,
         at_mm: [f64; 2],
@@ -175,7 +177,7 @@ impl Grid {
         (pattern, self.exit_mm(at_mm, signed_mm))
     }
 
-    /// How photons cross the grid at device (x, y); `direction` is a unit vector in the device frame with z > 0.
+    /// Path of photons that cross the grid at device (x, y); `direction` is a unit vector in the device frame with z > 0.
     #[inline]
     pub fn crossing(&self, at_mm: [f64; 2], direction: &Vector3<f64>) -> Crossing {
         let (d, p) = (self.strips.strip_mm, self.strips.pitch_mm);
@@ -197,16 +199,16 @@ impl Grid {
     }
 }
 
-/// Lengths of a way through the grid, in the frame where the strips are upright.
+/// Path lengths through the grid, in the frame where the strips are upright.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Crossing {
-    /// Length of the whole way.
+    /// Length of the path.
     way_mm: f64,
-    /// Over the sideways move.
+    /// Inverse of the sideways movement.
     per_sideways_mm: f64,
-    /// Part of the sideways move that lies in strips at any phase.
+    /// Part of the sideways movement that is in strips at any phase.
     certain_mm: f64,
-    /// What more lies in strips at the worst phase.
+    /// Additional part in strips at the worst phase.
     more_mm: f64,
     /// Shares of the phase with the most, with the least, and in between.
     plateau: f64,
@@ -233,7 +235,7 @@ impl Crossing {
         let kappa = (strip - space) * (self.way_mm * self.per_sideways_mm) as f32;
         let most = kappa * self.more_mm as f32;
         let lost = 1.0 - exp(-most);
-        // Where the difference loses digits, the first terms of its series.
+        // First terms of the series where the difference loses digits.
         let series = 1.0 - most * (0.5 - most * (1.0 / 6.0 - most * (1.0 / 24.0)));
         let ramp = if most.abs() > 0.05 {
             lost / most
@@ -311,7 +313,7 @@ mod tests {
         }
     }
 
-    /// Over even steps of the phase, whichever way photons lean: the mean of stationary strips is that of moving ones.
+    /// Over uniform steps of the phase, for either direction of tilt: the mean of stationary strips is that of moving ones.
     #[test]
     fn stationary_strips_have_the_mean_of_moving_ones() {
         const STEPS: usize = 20_000;
@@ -340,20 +342,20 @@ mod tests {
             let spaces = (-attenuation[1] * grid.way_mm(&direction)).exp();
             assert!((pattern.mean() * spaces / expected - 1.0).abs() < 1e-6);
         }
-        // Photons along the strips: the strip on the centre stops them, the space beside it does not.
+        // Photons along the strips: the strip at the centre stops them, the space next to it does not.
         let along = |x_mm: f64| {
             grid.transmission_in_place([x_mm, 0.0], &Vector3::z(), grid.attenuation(40.0))
         };
         assert!(along(3.0) < 1e-10 && along(3.024) < 1e-10 && along(2.976) < 1e-10);
         assert!(along(3.026) > 0.5 && along(2.974) > 0.5 && along(3.25) < 1e-10);
-        // A photon that comes from lower x has met what lies there.
+        // A photon that comes from lower x has crossed what is there.
         let from_low = Vector3::new(0.05, 0.0, 1.0).normalize();
         let at =
             |x_mm: f64| grid.transmission_in_place([x_mm, 0.0], &from_low, grid.attenuation(40.0));
         assert!(at(3.06) < 0.1 * at(2.94), "{} {}", at(3.06), at(2.94));
     }
 
-    /// Along the strips: D/(D + d) · exp(−μ h) of the spaces, plus what lead of 2 mm lets through (nothing at 60 keV),
+    /// Along the strips: D/(D + d) · exp(−μ h) of the spaces, plus the transmission of 2 mm of lead (zero at 60 keV),
     /// everywhere on a grid focused at the source.
     #[test]
     fn primary_passes_the_spaces() {
@@ -369,7 +371,7 @@ mod tests {
         }
     }
 
-    /// A grid without height does nothing, whatever the direction; at the wrong distance it cuts off: the shadow of a strip
+    /// A grid without height has no effect, whatever the direction; at the wrong distance it cuts off: the shadow of a strip
     /// covers h x |1/f₁ − 1/f₂| of the space D, which is r x |1/f₁ − 1/f₂| of it.
     #[test]
     fn limits_and_cut_off() {
@@ -392,8 +394,8 @@ mod tests {
         assert!((0.0..1e-30).contains(&grazing));
     }
 
-    /// What a grid is for: photons spread evenly within 60° of the normal pass a 10:1 grid at 60 keV with about a tenth,
-    /// primary with about two thirds.
+    /// The purpose of a grid: of photons spread evenly within 60° of the normal about a tenth pass a 10:1 grid at 60 keV,
+    /// of the primary about two thirds.
     #[test]
     fn scatter_is_stopped_and_primary_is_not() {
         let grid = Grid::new(&clinical(), [0.0; 2]).unwrap();

@@ -8,20 +8,20 @@ use rayon::prelude::*;
 /// A symmetric kernel of the plane, as a sum of products of a kernel along rows and the same along columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Kernel {
-    /// The quarter with offsets 0 and more.
+    /// Quarter of the kernel with non-negative offsets.
     quarter: DMatrix<f64>,
     /// Weights and halves of line kernels.
     terms: Vec<(f32, Vec<f32>)>,
 }
 
-/// Values below this share of the largest are left out, of the kernel and of its terms.
+/// Values below this share of the largest are omitted, in the kernel and in its terms.
 const NEGLIGIBLE: f64 = 1e-6;
 
 impl Kernel {
     /// The kernel whose transfer function is that of `transfer` up to the Nyquist frequency and 1 at frequency 0.
     ///
     /// `transfer` takes frequencies in cycles per pixel and gives the values at all pairs of them, the same for both
-    /// axes; `reach` is in pixels. Samples of a narrow function would not do: their transfer comes back at Nyquist.
+    /// axes; `reach` is in pixels. Samples of a narrow function would not do: their transfer is aliased near Nyquist.
     pub fn of_transfer(reach: usize, transfer: impl FnOnce(&[f64]) -> DMatrix<f64>) -> Self {
         let frequencies = frequencies(2 * reach.max(32));
         let count = frequencies.len();
@@ -31,7 +31,7 @@ impl Kernel {
         Self::of_quarter(&waves * transfer(&frequencies) * waves.transpose()).scaled_to(1.0)
     }
 
-    /// The kernel of the squared values, scaled to a sum: what variances are spread by.
+    /// The kernel of the squared values, scaled to the given sum; it spreads variances.
     pub fn squared(&self, sum: f64) -> Self {
         Self::of_quarter(self.quarter.map(|value| value * value)).scaled_to(sum)
     }
@@ -65,12 +65,12 @@ impl Kernel {
         self
     }
 
-    /// Σ h²: what is left of the variance of white noise.
+    /// Σ h²: the factor by which the kernel reduces the variance of white noise.
     pub fn noise_gain(&self) -> f64 {
         self.sum_of(|value| value * value)
     }
 
-    /// Sum over the whole plane of a function of the values.
+    /// Sum over the plane of a function of the values.
     fn sum_of(&self, of: impl Fn(f64) -> f64) -> f64 {
         let twice = |n: usize| if n == 0 { 1.0 } else { 2.0 };
         let size = self.quarter.nrows();
@@ -80,7 +80,7 @@ impl Kernel {
             .sum()
     }
 
-    /// Spreads a row-major plane; beyond its edges it continues as its mirror image, so that the sum is kept.
+    /// Convolves a row-major plane, continued beyond its edges as its mirror image so that the sum is kept.
     pub fn apply(&self, plane: &[f32], columns: usize) -> Vec<f32> {
         let rows = plane.len() / columns;
         let mut sum = vec![0.0_f32; plane.len()];
@@ -114,7 +114,7 @@ impl Kernel {
     }
 }
 
-/// The middles of `count` equal intervals from 0 to the Nyquist frequency, cycles per pixel.
+/// Midpoints of `count` equal intervals from 0 to the Nyquist frequency, cycles per pixel.
 pub(crate) fn frequencies(count: usize) -> Vec<f64> {
     (0..count)
         .map(|i| 0.5 * (i as f64 + 0.5) / count as f64)
@@ -138,7 +138,7 @@ fn at_mirrored(len: usize, at: usize, kernel: &[f32], value: impl Fn(usize) -> f
     sum
 }
 
-/// Index inside 0..len after reflection at both ends, as often as it takes.
+/// Index inside 0..len after repeated reflection at both ends.
 fn mirrored(index: isize, len: usize) -> usize {
     let period = 2 * len as isize;
     let folded = index.rem_euclid(period);
@@ -189,7 +189,7 @@ mod tests {
         }
     }
 
-    /// A point spreads into the kernel, in the kernel of squares into its squares; both keep sums, edges included.
+    /// A point spreads into the kernel, and in the kernel of squares into its squares; both keep sums, edges included.
     #[test]
     fn points_spread_by_the_kernel_and_sums_are_kept() {
         let (columns, rows) = (50, 41);
@@ -212,7 +212,7 @@ mod tests {
         assert!((gain / kernel.noise_gain() - 1.0).abs() < 1e-4);
     }
 
-    /// Narrower than the kernel is long: the mirror image comes back several times.
+    /// A plane narrower than the kernel: the mirror image is repeated several times.
     #[test]
     fn an_even_plane_stays_even_however_narrow() {
         for (columns, rows) in [(1, 1), (2, 5), (7, 3)] {

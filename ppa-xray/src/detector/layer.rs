@@ -15,7 +15,7 @@ pub(crate) struct Thickness {
 }
 
 impl Layer {
-    /// A layer of a material of the library; what its thickness would be without gaps, µm.
+    /// A layer of a material of the library; `solid_um` is its thickness without gaps, µm.
     pub fn new(material: &str, solid_um: f64) -> Self {
         let material = Material::named(material).expect("in the library");
         Self {

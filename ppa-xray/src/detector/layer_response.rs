@@ -1,4 +1,4 @@
-//! What photons of one energy deposit in a layer.
+//! Energy that photons of one energy deposit in a layer.
 
 use crate::detector::escape::{KRay, Loss, Scattered};
 use crate::detector::layer::Layer;
@@ -9,13 +9,13 @@ use crate::matter::klein_nishina::{differential, energy_ratio};
 /// Points of the integral over the polar angle of Compton scattering.
 const POLAR: usize = 10;
 
-/// Ways to lose energy from the layer, for photons of one energy.
+/// Energy losses from the layer for photons of one energy.
 pub(crate) struct LayerResponse {
     energy_kev: f64,
     thickness: f64,
     k_rays: Vec<KRay>,
     scattered: Vec<Scattered>,
-    /// K x-rays where scattered photons, of their mean energy, interact again.
+    /// K x-rays emitted where scattered photons, of their mean energy, interact again.
     k_rays_of_scattered: Vec<KRay>,
 }
 
@@ -23,7 +23,7 @@ impl LayerResponse {
     pub fn new(layer: &Layer, energy_kev: f64) -> Self {
         let at = layer.thickness(energy_kev);
         let alpha = energy_kev / ELECTRON_REST_KEV;
-        // Klein and Nishina per solid angle.
+        // Klein–Nishina per solid angle.
         let angles = gauss_legendre::<POLAR>().map(|(x, weight)| {
             let cos = 2.0 * x - 1.0;
             let scattered_kev = energy_ratio(alpha, cos) * energy_kev;

@@ -1,16 +1,17 @@
-//! Lubberts effect: noise that is blurred less than the signal, as the blur of a photon's light depends on the depth at which it interacts.
+//! Lubberts effect: noise is blurred less than the signal, because the blur of a photon's light depends on the depth of the interaction.
 //!
-//! With the MTF T of the signal and the noise transfer N ≥ T, the root of the normalised noise power, the DQE is lower by the ratio R = T²/N² (Lubberts, J. Opt. Soc.
-//! Am. 58 (1968) 1475). Photons whose light is spread by the same kernel of transfer N, about a point displaced at random from where they
-//! interact, have that noise, since displaced photons are as independent of each other as others; and they have the signal T if the distribution of
-//! the displacement has the characteristic function A = T/N. With 1/(1 + H f²) for T and 1/(1 + H_N f²) for N that is
+//! With the MTF T of the signal and the noise transfer N ≥ T, the square root of the normalised noise power, the DQE is lower by the
+//! ratio R = T²/N² (Lubberts, J. Opt. Soc. Am. 58 (1968) 1475). Photons whose light is spread by the same kernel of transfer N, about a
+//! point displaced at random from the interaction, have that noise, since displaced photons are still independent of each other. They
+//! have the signal T if the distribution of the displacement has the characteristic function A = T/N. With 1/(1 + H f²) for T and
+//! 1/(1 + H_N f²) for N that is
 //!
 //! A = H_N/H + (1 − H_N/H) / (1 + H f²):
 //!
-//! a share H_N/H of the photons stays, the others are displaced by a Gaussian whose variance along either axis is exponentially distributed, with
-//! mean H/2π².
+//! a share H_N/H of the photons is not displaced, the others are displaced by a Gaussian whose variance along either axis is exponentially
+//! distributed, with mean H/2π².
 //!
-//! This gives signal and noise power of depth-dependent blur, not the light of single photons.
+//! This reproduces signal and noise power of depth-dependent blur, not the light of single photons.
 
 use std::f64::consts::PI;
 
@@ -21,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::beam::receptor::{Blur, ReceptorError, require};
 use crate::detector::mtf::{CurvePoint, Mtf, last_per_mm, lorentzian, table};
 
-/// Noise transfer of a converter and the displacement of photons that leads from it to the MTF.
+/// Noise transfer of a converter, and the displacement of photons that converts it to the MTF.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Lubberts {
@@ -34,7 +35,7 @@ pub(crate) struct Lubberts {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Displacement {
-    /// A share of the photons stays, the others move by a Gaussian of exponentially distributed variance.
+    /// A share of the photons is not displaced, the others are displaced by a Gaussian of exponentially distributed variance.
     Exponential {
         stays: f64,
         /// Mean variance along either axis, pixels².
@@ -45,10 +46,11 @@ pub(crate) enum Displacement {
 }
 
 impl Lubberts {
-    /// None if noise is blurred as the signal is.
+    /// `None` if noise is blurred like the signal.
     ///
     /// # Errors
-    /// [`ReceptorError`] for numbers that make no sense, a noise transfer below the MTF, and a noise transfer or ratio of MTF and noise transfer that does not fall steadily.
+    /// [`ReceptorError`] for invalid numbers, a noise transfer below the MTF, and a noise transfer or ratio of MTF and noise transfer that
+    /// does not fall steadily.
     pub fn of(blur: &Blur, pixel_mm: f64) -> Result<Option<Self>, ReceptorError> {
         let last_per_mm = last_per_mm(pixel_mm);
         match blur {
@@ -87,7 +89,7 @@ impl Lubberts {
                             mtf: signal.value,
                         });
                     }
-                    // The image has N times A: an error of A matters where N is large.
+                    // The transfer of the image is N times A, so an error of A matters where N is large.
                     Ok(CurvePoint {
                         value: signal.value / noise.value.max(f64::MIN_POSITIVE),
                         weight: noise.value,
@@ -109,14 +111,14 @@ impl Lubberts {
 const NOISE: &str = "noise transfer";
 
 impl Displacement {
-    /// The displacement of a photon along x and y, pixels.
+    /// Samples the displacement of a photon along x and y, pixels.
     pub fn draw(&self, rng: &mut Philox) -> [f64; 2] {
         let sigma = match self {
             Self::Exponential { stays, variance } => {
                 if rng.unit() < *stays {
                     0.0
                 } else {
-                    // 1 − u lies in (0, 1], so the logarithm stays finite.
+                    // 1 − u is in (0, 1], so the logarithm stays finite.
                     (-variance * (1.0 - rng.unit()).ln()).sqrt()
                 }
             }
@@ -126,7 +128,7 @@ impl Displacement {
                     left -= weight;
                     left < 0.0
                 });
-                // By rounding the weights may sum to less than 1.
+                // Because of rounding the weights may sum to less than 1.
                 term.or(mixture.terms().last()).map_or(0.0, |term| term.1)
             }
         };
@@ -167,7 +169,8 @@ mod tests {
         }
     }
 
-    /// The mean of cos 2πfx over draws, 1e5 of them: an error of 0.0023 at most, 10 comparisons at 4.5 standard errors; and for tables 0.03/N for the fit.
+    /// The mean of cos 2πfx over 1e5 samples: an error of 0.0023 at most, 10 comparisons at 4.5 standard errors; for tables
+    /// another 0.03/N for the fit.
     #[test]
     fn displaced_photons_lead_from_noise_to_signal() {
         const DRAWS: u32 = 100_000;

@@ -1,4 +1,4 @@
-//! What photons at the detector plane become: grid, converter layer, blur, electronics.
+//! Response of the detector to photons: grid, converter layer, blur, electronics.
 
 pub(crate) mod absorption;
 pub(crate) mod blur;

@@ -9,8 +9,8 @@ use crate::beam::receptor::{Blur, ReceptorError, require};
 
 /// An MTF as a sum of Gaussians of the frequency, without the aperture of the pixels.
 ///
-/// Any MTF that falls as converters' do is one: 1/(1 + H f²) is ∫ exp(−t) exp(−t H f²) dt. Weights are positive and sum
-/// to 1, so that the signal is kept.
+/// Any MTF that falls like those of converters can be written so: 1/(1 + H f²) is ∫ exp(−t) exp(−t H f²) dt. Weights are positive and
+/// sum to 1, so that the signal is kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Mtf {
@@ -18,10 +18,10 @@ pub(crate) struct Mtf {
     terms: Vec<(f64, f64)>,
 }
 
-/// Aliases on either side that count; without blur the rest has 6e-3 of the power at Nyquist.
+/// Number of aliases on either side; without blur the rest has 6e-3 of the power at Nyquist.
 const ALIASES: i32 = 16;
 
-/// Largest difference between a curve and its sum of Gaussians that passes.
+/// Largest accepted difference between a curve and its sum of Gaussians.
 const WORST_FIT: f64 = 0.03;
 
 /// A value of a transfer function at a frequency.
@@ -29,7 +29,7 @@ const WORST_FIT: f64 = 0.03;
 pub(crate) struct CurvePoint {
     pub per_mm: f64,
     pub value: f64,
-    /// How much its error counts in a fit, at most 1.
+    /// Weight of its error in a fit, at most 1.
     pub weight: f64,
 }
 
@@ -43,7 +43,7 @@ impl CurvePoint {
     }
 }
 
-/// Three times the Nyquist frequency, where the first aliases end.
+/// Three times the Nyquist frequency, the end of the first aliases.
 pub(crate) fn last_per_mm(pixel_mm: f64) -> f64 {
     1.5 / pixel_mm
 }
@@ -57,10 +57,10 @@ pub(crate) fn lorentzian(h_mm2: f64, last_per_mm: f64) -> Vec<CurvePoint> {
 }
 
 impl Mtf {
-    /// The MTF of the signal, fitted up to three times the Nyquist frequency, where the first aliases end.
+    /// The MTF of the signal, fitted up to three times the Nyquist frequency, the end of the first aliases.
     ///
     /// # Errors
-    /// [`ReceptorError`] for numbers that make no sense, and for a curve that no sum of Gaussians follows within 0.03.
+    /// [`ReceptorError`] for invalid numbers, and for a curve that no sum of Gaussians fits within 0.03.
     pub fn of(blur: &Blur, pixel_mm: f64) -> Result<Self, ReceptorError> {
         let last_per_mm = last_per_mm(pixel_mm);
         let curve = match blur {
@@ -74,10 +74,10 @@ impl Mtf {
         Self::fitted("MTF", &curve, pixel_mm)
     }
 
-    /// The sum of Gaussians that comes nearest to the points of a curve.
+    /// Fits a sum of Gaussians to the points of a curve.
     ///
     /// # Errors
-    /// [`ReceptorError::Mtf`] where it is off by more than 0.03 over the weight of the point.
+    /// [`ReceptorError::Mtf`] if the error of a point exceeds 0.03 divided by its weight.
     pub fn fitted(
         name: &'static str,
         curve: &[CurvePoint],
@@ -151,7 +151,7 @@ impl Mtf {
         sum_of_squares(frequencies.len(), terms)
     }
 
-    /// Distance in pixels beyond which less than 1e-4 of the signal goes.
+    /// Distance in pixels beyond which less than 1e-4 of the signal is spread.
     pub fn reach(&self) -> usize {
         let beyond = |reach: usize| -> f64 {
             let terms = self.terms.iter().filter(|(_, sigma)| *sigma > 0.0);
@@ -190,7 +190,7 @@ fn gaussian_mtf(sigma: f64, f: f64) -> f64 {
     (-2.0 * (PI * sigma * f).powi(2)).exp()
 }
 
-/// A measured curve, checked, with (0, 1) in front and without what lies beyond the last frequency.
+/// Checks a measured curve, puts (0, 1) in front, and removes the points beyond the last frequency.
 pub(crate) fn table(
     name: &'static str,
     per_mm: &[f64],
@@ -222,7 +222,7 @@ pub(crate) fn table(
         require(what, value, 0.0..=1.0, "0 to 1")?;
         curve.push(CurvePoint::new(f, value));
     }
-    // One point beyond it is kept, so that the fit knows where the curve goes.
+    // One point beyond it is kept to guide the fit.
     let inside = curve.partition_point(|point| point.per_mm <= last_per_mm);
     curve.truncate(inside + 1);
     Ok(curve)
@@ -230,7 +230,7 @@ pub(crate) fn table(
 
 /// Non-negative least squares by an active set (Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23).
 ///
-/// The value at frequency 0 weighs heavily, so that the weights sum to about 1.
+/// The value at frequency 0 has a large weight, so that the weights sum to about 1.
 fn fit(curve: &[CurvePoint], basis: &[f64]) -> Vec<f64> {
     const EMPHASIS: f64 = 30.0;
     let emphasis = |point: &CurvePoint| {
@@ -249,7 +249,7 @@ fn fit(curve: &[CurvePoint], basis: &[f64]) -> Vec<f64> {
     );
     let mut weights = DVector::<f64>::zeros(basis.len());
     let mut active: Vec<usize> = Vec::new();
-    // Every round adds one term; more rounds than terms happen only when rounding makes it go in circles.
+    // Every round adds one term; there are more rounds than terms only if rounding causes a cycle.
     for _ in 0..3 * basis.len() {
         let slope = matrix.tr_mul(&(&target - &matrix * &weights));
         let free = (0..basis.len()).filter(|column| !active.contains(column));
@@ -265,7 +265,7 @@ fn fit(curve: &[CurvePoint], basis: &[f64]) -> Vec<f64> {
             let Ok(solution) = columns.svd(true, true).solve(&target, 1e-10) else {
                 return weights.as_slice().to_vec();
             };
-            // How far towards the solution all weights stay positive.
+            // Largest step towards the solution for which all weights stay positive.
             let step = active
                 .iter()
                 .zip(&solution)
@@ -300,7 +300,7 @@ fn fit(curve: &[CurvePoint], basis: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// T and the sum over its aliases, against the curve itself: the fit is right to 0.012 where the image is not black.
+    /// T and the sum over its aliases, against the curve itself: the fit is accurate to 0.012 where the image is not black.
     #[test]
     fn planes_are_those_of_the_curve() {
         for (h_mm2, pixel_mm) in [(0.45, 0.15), (0.45, 0.5), (0.45, 1.0), (0.02, 0.15)] {

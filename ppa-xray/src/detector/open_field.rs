@@ -1,4 +1,4 @@
-//! What the pixels would read with nothing in the beam.
+//! Reading of the pixels with nothing in the beam.
 
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
@@ -7,20 +7,20 @@ use crate::beam::field::Field;
 use crate::detector::response::Response;
 use crate::transport::tracking::Transport;
 
-/// Nodes per side of the detector, when intensity or response vary over it.
+/// Nodes per side of the detector, if intensity or response vary over it.
 const NODES: usize = 33;
 
-/// Reading over the detector plane without phantom and with the collimator wide open, over that at the detector's centre.
+/// Reading over the detector plane without phantom and with the collimator fully open, relative to that at the detector's centre.
 ///
-/// An even beam on a detector that takes everything falls off as cos³θ; heel effect, grid and incidence on the
-/// converter change slowly, so their ratio to cos³θ is interpolated between a few nodes.
+/// A uniform beam on a detector that absorbs everything falls off as cos³θ. Heel effect, grid and incidence on the
+/// converter vary slowly, so their ratio to cos³θ is interpolated between a few nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OpenField {
     low_mm: [f64; 2],
     high_mm: [f64; 2],
     source_detector_mm: f64,
-    /// What the collimator leaves open to the whole focal spot.
+    /// Part of the plane that the collimator leaves open to the entire focal spot.
     field: Field,
     side: usize,
     /// Row by row over the detector's rectangle.
@@ -28,7 +28,7 @@ pub(crate) struct OpenField {
 }
 
 impl OpenField {
-    /// The shape, and the reading at the centre in eV/cm² per history.
+    /// Returns the shape, and the reading at the centre in eV/cm² per history.
     pub fn of(transport: &Transport, response: &Response) -> (Self, f64) {
         let emitter = &transport.emitter;
         let open_over_focal = transport.open_over_focal();
@@ -68,7 +68,7 @@ impl OpenField {
         (shape, central)
     }
 
-    /// At device (x, y) of the detector's rectangle.
+    /// Relative reading at device (x, y) of the detector's rectangle.
     pub fn at(&self, at: Point2<f64>) -> f64 {
         let [(i, s), (j, t)] = [0, 1].map(|axis| {
             let share = (at[axis] - self.low_mm[axis]) / (self.high_mm[axis] - self.low_mm[axis]);
@@ -85,7 +85,7 @@ impl OpenField {
         ratio * self.cos3(at) / self.cos3(Point2::from(centre))
     }
 
-    /// Whether the whole square of side `side_mm` around `at` lies in the collimated field, but for rounding.
+    /// Whether the entire square of side `side_mm` around `at` is in the collimated field, apart from rounding.
     pub fn exposes(&self, at: Point2<f64>, side_mm: f64) -> bool {
         const ROUNDING_MM: f64 = 1e-6;
         let reach_mm = 0.5 * side_mm - ROUNDING_MM;

@@ -1,6 +1,6 @@
 //! Integrals over a layer: the exponential integral, and points and weights.
 
-/// Exponential integral E₂(x) = ∫₀¹ exp(−x/c) dc: the share of isotropic photons that get through an optical
+/// Exponential integral E₂(x) = ∫₀¹ exp(−x/c) dc: the share of isotropic photons that pass an optical
 /// depth x of a half-space (Abramowitz and Stegun, 5.1.4, 5.1.11, 5.1.14, 5.1.22).
 pub(crate) fn e2(x: f64) -> f64 {
     const EULER: f64 = 0.577_215_664_901_532_9;
@@ -39,7 +39,7 @@ pub(crate) fn e2(x: f64) -> f64 {
     (-x).exp() - x * e1
 }
 
-/// Points and weights of Gauss and Legendre on [0, 1].
+/// Points and weights of Gauss–Legendre quadrature on [0, 1].
 pub(crate) fn gauss_legendre<const N: usize>() -> [(f64, f64); N] {
     std::array::from_fn(|i| {
         let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (N as f64 + 0.5)).cos();

@@ -1,4 +1,4 @@
-//! Reading of the pixels: blur of the converter; the size of the electronic noise.
+//! Readout of the pixels: blur of the converter and the size of the electronic noise.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::transport::tally::Moments;
 
 /// Blur and electronic noise, ready to be applied.
 ///
-/// Blur acts on every layer and its quantum noise alike, see [`Spread`]. Then every pixel has its gain, and electronic noise comes on top.
+/// Blur acts on every layer and on its quantum noise, see [`Spread`]. Then each pixel's gain is applied and electronic noise is added.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Readout {
@@ -24,25 +24,25 @@ pub(crate) struct Readout {
 /// One image plane, row-major, eV/cm² per history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
-    /// Energy that arrives at the pixel, per area of it and per history.
+    /// Energy that arrives at the pixel, per area and per history.
     pub value: Vec<f32>,
     /// Standard error of `value`.
     pub sigma: Vec<f32>,
 }
 
-/// A layer whose noise was drawn pixel by pixel, before blur; eV/cm² per history.
+/// A layer whose noise was drawn pixel by pixel before blur; eV/cm² per history.
 pub(crate) struct DrawnLayer {
-    /// The expected signal.
+    /// Expected signal.
     pub expected: Vec<f32>,
-    /// Its standard error, which neighbouring pixels share.
+    /// Standard error of the expected signal, correlated between neighbouring pixels.
     pub shared_sigma: Vec<f32>,
-    /// Quantum noise and its variance, independent from pixel to pixel; none for the expected image.
+    /// Quantum noise and its variance, independent from pixel to pixel; `None` for the expected image.
     pub noise: Option<[Vec<f32>; 2]>,
 }
 
 impl Readout {
     /// # Errors
-    /// [`ReceptorError`] naming the number at fault.
+    /// [`ReceptorError`] naming the invalid number.
     pub fn new(receptor: &Receptor, detector: &Detector) -> Result<Self, ReceptorError> {
         let what = "the electronic noise per pixel in keV";
         let electronic_noise_kev = receptor.electronic_noise_kev;
@@ -62,22 +62,22 @@ impl Readout {
         &self.gains
     }
 
-    /// Side in pixels of the square over which photons are to be spread when they are counted; 0 without blur.
+    /// Side in pixels of the square over which each counted photon is spread; 0 without blur.
     pub fn spot_pixels(&self) -> f64 {
         self.blur.as_ref().map_or(0.0, Spread::spot_pixels)
     }
 
-    /// Transfer of the signal by the blur at a frequency in cycles per pixel; none without blur.
+    /// Signal transfer of the blur at a frequency in cycles per pixel; `None` without blur.
     pub fn transfer(&self, frequency: f64) -> Option<f64> {
         self.blur.as_ref().map(|blur| blur.transfer(frequency))
     }
 
-    /// How photons are to be displaced before they are counted; none for those that stay where they are.
+    /// Displacement applied to photons before they are counted; `None` if they are not displaced.
     pub fn displacement(&self) -> Option<&Displacement> {
         self.blur.as_ref().and_then(Spread::displacement)
     }
 
-    /// What pixels count of displaced photons in the mean, from what they would count without displacement; none where that is the same.
+    /// Expected moments of displaced photons, from the moments without displacement; `None` where both are the same.
     pub fn displaced(&self, moments: &[Moments], columns: usize) -> Option<Vec<Moments>> {
         let kernel = self.blur.as_ref()?.of_displacement()?;
         let spread = |of: fn(&Moments) -> f64| {
@@ -86,7 +86,7 @@ impl Readout {
         };
         let mean_kev = spread(|pixel| pixel.mean_kev);
         let square_kev2 = spread(|pixel| pixel.square_kev2);
-        // Beside sharp edges the kernel rings to just below 0, where the ratio of both would be arbitrary.
+        // Next to sharp edges the kernel rings to just below 0, where the ratio of both would be arbitrary.
         let quanta_kev = moments.iter().filter(|pixel| pixel.mean_kev > 0.0);
         let quanta_kev = quanta_kev.map(|pixel| pixel.square_kev2 / pixel.mean_kev);
         let [least_kev, most_kev] = quanta_kev.fold([f64::MAX, 0.0], |[least, most], kev| {
@@ -106,7 +106,7 @@ impl Readout {
         Some(displaced.collect())
     }
 
-    /// What is read out of pixels that have counted photons one by one, with standard errors from the squares they counted.
+    /// Reads out pixels that counted photons one by one; standard errors come from the squares they counted.
     pub fn counted(&self, layers: [Layer; 4], columns: usize) -> [Layer; 4] {
         let Some(blur) = &self.blur else {
             return layers;
@@ -121,9 +121,9 @@ impl Readout {
         })
     }
 
-    /// What is read out of pixels whose noise was drawn.
+    /// Reads out pixels whose noise was drawn.
     ///
-    /// The error of the expected signal continues over farther than the blur, which leaves it as it is.
+    /// The error of the expected signal is correlated over more than the width of the blur, so the blur leaves it unchanged.
     pub fn drawn(&self, layers: [DrawnLayer; 4], columns: usize) -> [Layer; 4] {
         let kernels = self.blur.as_ref().map(|blur| {
             let noise = blur.of_white_noise();
@@ -172,7 +172,7 @@ impl Readout {
     }
 }
 
-/// Standard deviations; rounding may leave a variance a hair below 0.
+/// Square roots of the variances. Rounding may leave a variance just below 0.
 fn roots(mut variance: Vec<f32>) -> Vec<f32> {
     for value in &mut variance {
         *value = value.max(0.0).sqrt();

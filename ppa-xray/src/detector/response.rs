@@ -1,4 +1,4 @@
-//! From photons at the detector plane to energy in the detector.
+//! Conversion of photons at the detector plane to energy in the detector.
 
 use nalgebra::Vector3;
 use ppa_core::random::Philox;
@@ -9,10 +9,10 @@ use crate::detector::grid::Grid;
 use crate::transport::score::Arrival;
 use crate::transport::tally::Moments;
 
-/// An image receptor ready to take photons.
+/// An image receptor prepared for photons.
 ///
-/// The signal of a pixel is the sum of many photons' energies, so only mean and mean square of what one leaves
-/// matter, and both engines take them from here.
+/// The signal of a pixel is the sum of the energies of many photons, so only the mean and mean square per photon
+/// matter. Both engines use those computed here.
 #[derive(Debug, Clone)]
 pub(crate) struct Response {
     absorption: Option<Absorption>,
@@ -20,10 +20,10 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// The receptor on a detector whose centre is at device (x, y).
+    /// Prepares the receptor for a detector whose centre is at device (x, y).
     ///
     /// # Errors
-    /// [`ReceptorError`] naming the number or material at fault.
+    /// [`ReceptorError`] naming the invalid number or material.
     pub fn new(receptor: &Receptor, centre_mm: [f64; 2]) -> Result<Self, ReceptorError> {
         let grid = receptor.grid.as_ref();
         Ok(Self {
@@ -32,12 +32,12 @@ impl Response {
         })
     }
 
-    /// Whether every photon deposits all its energy.
+    /// Whether every photon deposits its full energy.
     pub fn is_ideal(&self) -> bool {
         self.absorption.is_none() && self.grid.is_none()
     }
 
-    /// The converter; none for the ideal detector.
+    /// The converter; `None` for the ideal detector.
     pub fn absorption(&self) -> Option<&Absorption> {
         self.absorption.as_ref()
     }
@@ -54,8 +54,8 @@ impl Response {
             .copied()
     }
 
-    /// Mean and mean square of the energy that a photon deposits when it crosses the plane at device (x, y); averaged over the phase of the strips,
-    /// if there is a grid.
+    /// Mean and mean square of the energy that a photon deposits when it crosses the plane at device (x, y), averaged over the phase of
+    /// the strips if there is a grid.
     ///
     /// `direction` is a unit vector in the device frame with z > 0.
     #[inline]
@@ -64,10 +64,10 @@ impl Response {
         self.absorbed(energy_kev, direction.z).scaled(passes)
     }
 
-    /// The energy that an arriving photon deposits, keV: a draw whose first two moments are [`Response::moments`], or, with a stationary grid, those
-    /// at its position.
+    /// Samples the energy that an arriving photon deposits, keV. The first two moments of the sample are [`Response::moments`], or, with a
+    /// stationary grid, those at its position.
     ///
-    /// The draw is ⟨ε²⟩/⟨ε⟩ with probability ⟨ε⟩²/⟨ε²⟩ (absorption times Swank factor), and 0 otherwise.
+    /// The sample is ⟨ε²⟩/⟨ε⟩ with probability ⟨ε⟩²/⟨ε²⟩ (absorption times Swank factor), and 0 otherwise.
     #[inline]
     pub fn detect(&self, arrival: &Arrival, rng: &mut Philox) -> f64 {
         if self.is_ideal() {
@@ -91,7 +91,7 @@ impl Response {
         }
     }
 
-    /// Probability to pass the grid.
+    /// Probability of passing the grid.
     #[inline]
     fn passes(&self, energy_kev: f64, at_mm: [f64; 2], direction: &Vector3<f64>) -> f64 {
         match &self.grid {
@@ -120,9 +120,9 @@ impl Response {
 pub(crate) struct LineResponse<'a> {
     grid: Option<&'a Grid>,
     energy_kev: Vec<f64>,
-    /// What a photon of every line leaves, cosine by cosine.
+    /// Moments deposited by a photon of every line, by cosine.
     absorbed: Option<Vec<Vec<Moments>>>,
-    /// Strip and interspace of the grid at every line, 1/mm.
+    /// Attenuation of strip and interspace of the grid at every line, 1/mm.
     attenuation: Vec<[f64; 2]>,
 }
 
@@ -223,7 +223,7 @@ mod tests {
         })
     }
 
-    /// Draws of an arrival have the moments of the table, and lines have them too.
+    /// Samples of an arrival have the moments of the table, and so have lines.
     #[test]
     fn draws_and_lines_have_the_moments_of_the_table() {
         let response = Response::new(&receptor(), [0.0; 2]).unwrap();
@@ -241,7 +241,7 @@ mod tests {
                 square += left * left;
             }
             let n = f64::from(draws);
-            // Draws are 0 or one value, so both moments have the relative error of their count.
+            // Samples are 0 or one value, so both moments have the relative error of their count.
             let error = ((1.0 / (n * sum / n / largest)) - 1.0 / n).sqrt();
             let z = [
                 (sum / n / expected.mean_kev - 1.0) / error,

@@ -1,14 +1,14 @@
 //! Transmission of the strips of a stationary grid as a function of position.
 //!
-//! In the frame sheared along its strips, see [`Grid`](crate::detector::grid::Grid), a photon that leaves the grid at v has moved over [v − Δ, v]. The part of Δ in strips is a
-//! continuous function of v, straight between four points of a period: where either end of the way enters or leaves a strip. So integrals of exp(−κ · part) over v
-//! and its Fourier coefficients have closed forms.
+//! In the frame sheared along its strips, see [`Grid`](crate::detector::grid::Grid), a photon that leaves the grid at v has moved over
+//! [v − Δ, v]. The part of Δ in strips is a continuous function of v, linear between four points of a period, at which either end of the
+//! path enters or leaves a strip. So integrals of exp(−κ · part) over v and its Fourier coefficients have closed forms.
 
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-/// Strips of thickness `strip_mm`, one every `pitch_mm`, one of them centred at 0.
+/// Strips of thickness `strip_mm` with a period of `pitch_mm`, one of them centred at 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Strips {
     pub strip_mm: f64,
@@ -16,9 +16,9 @@ pub(crate) struct Strips {
 }
 
 impl Strips {
-    /// Length in strips of a way sideways that ends at `to_mm`.
+    /// Length in strips of a sideways path that ends at `to_mm`.
     pub fn in_strips_mm(&self, to_mm: f64, sideways_mm: f64) -> f64 {
-        // From the edge of a strip; reduced first, so that no digits are lost where the way is short.
+        // Relative to the edge of a strip; reduced first, so that no digits are lost for a short path.
         let to = (to_mm + 0.5 * self.strip_mm).rem_euclid(self.pitch_mm);
         self.up_to(to) - self.up_to(to - sideways_mm)
     }
@@ -30,11 +30,11 @@ impl Strips {
     }
 }
 
-/// exp(−κ · length in strips) of photons that all move sideways by the same way, as a function of where they leave the grid.
+/// exp(−κ · length in strips) for photons with the same sideways movement, as a function of the exit position.
 #[derive(Debug, Clone)]
 pub(crate) struct StripPattern {
     pitch_mm: f64,
-    /// Where the first piece begins.
+    /// Start of the first piece.
     first_mm: f64,
     pieces: Vec<Piece>,
     /// Integral over a period.
@@ -62,7 +62,7 @@ impl Piece {
 }
 
 impl StripPattern {
-    /// `kappa_per_mm`: what a length in strips attenuates more than the same length in spaces, per way sideways.
+    /// `kappa_per_mm` is the additional attenuation in strips compared with spaces, per sideways length.
     pub fn new(strips: Strips, sideways_mm: f64, kappa_per_mm: f64) -> Self {
         let Strips { strip_mm, pitch_mm } = strips;
         let half = 0.5 * strip_mm;
@@ -112,7 +112,7 @@ impl StripPattern {
         (self.up_to(at + 0.5 * width_mm) - self.up_to(at - 0.5 * width_mm)) / width_mm
     }
 
-    /// Integral from the first bend on.
+    /// Integral from the first bend.
     fn up_to(&self, at_mm: f64) -> f64 {
         let periods = (at_mm / self.pitch_mm).floor();
         let mut rest = at_mm - periods * self.pitch_mm;
@@ -150,7 +150,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Length in strips by counting steps; mean, aperture and Fourier sum of the pattern by sums over places.
+        /// Length in strips by counting steps; mean, aperture and Fourier sum of the pattern by sums over positions.
         #[test]
         fn closed_forms_are_sums_over_places(
             strip_mm in 0.02..0.15_f64, sideways_mm in 1e-4..0.7_f64, at_mm in -3.0..3.0_f64, width_mm in 0.03..0.6_f64, opacity in -0.5..20.0_f64

@@ -1,4 +1,4 @@
-//! [`Response`] in `f32`, tabulated evenly in energy, for the many sums of the fast engine.
+//! [`Response`] in `f32`, tabulated at equal energy steps, for the many sums of the fast engine.
 //!
 //! An absorption edge is smeared over 1/32 keV, except at the lines, which have nodes of their own.
 
@@ -14,17 +14,17 @@ use crate::vector_math::{WIDTH, pad};
 /// Nodes per keV.
 const NODES_PER_KEV: f32 = 32.0;
 
-/// What photons of a set of energies leave: nodes evenly spaced from the cut-off on, or the lines of a quadrature.
+/// Energy deposited by photons of a set of energies: nodes evenly spaced above the cut-off, or the lines of a quadrature.
 #[derive(Debug)]
 struct Table {
-    /// Mean energy and mean squared energy of a photon that reaches the converter, node by node, for every cosine of
-    /// [`Absorption::cosines`]; a single one where it makes no difference.
+    /// Mean energy and mean squared energy of a photon that reaches the converter, by node, for every cosine of
+    /// [`Absorption::cosines`]; a single entry if they do not depend on the cosine.
     left: Vec<[Vec<f32>; 2]>,
-    /// Attenuation of strips and of the interspace, 1/mm, node by node; zeros without a grid.
+    /// Attenuation of strips and interspace, 1/mm, by node; zero without a grid.
     attenuation: [Vec<f32>; 2],
 }
 
-/// The numbers of [`WIDTH`] photons.
+/// Values of [`WIDTH`] photons.
 type Lanes = [f32; WIDTH];
 
 impl Table {
@@ -58,7 +58,7 @@ impl Table {
         }
     }
 
-    /// The two cosines next to one, and how far from the first to the second.
+    /// The two cosines next to a cosine, and its position between them.
     fn columns(&self, cos: f64) -> ([&[Vec<f32>; 2]; 2], f32) {
         if let [only] = &self.left[..] {
             return ([only, only], 0.0);
@@ -68,7 +68,7 @@ impl Table {
     }
 }
 
-/// A receptor, ready for photons of the lines and of any other energy.
+/// A receptor, prepared for photons of the lines and of any other energy.
 #[derive(Debug)]
 pub(crate) struct TabulatedResponse<'a> {
     grid: Option<&'a Grid>,
@@ -83,7 +83,7 @@ pub(crate) struct Incidence<'a> {
     cos: f64,
 }
 
-/// What a table says of one photon.
+/// Table values for one photon.
 #[derive(Default)]
 struct Photon {
     attenuation: [f32; 2],
@@ -115,7 +115,7 @@ impl<'a> TabulatedResponse<'a> {
 }
 
 impl Incidence<'_> {
-    /// Mean and mean square of the energy that photons leave together; `photons` line by line, padded.
+    /// Mean and mean square of the energy that photons deposit together; `photons` by line, padded.
     pub fn of_lines(&self, photons: &[f32]) -> Moments {
         let table = &self.response.lines;
         let ([near, far], s) = table.columns(self.cos);
@@ -131,7 +131,7 @@ impl Incidence<'_> {
         })
     }
 
-    /// As [`Incidence::of_lines`] for photons of given energies; those below the cut-off leave nothing.
+    /// The same as [`Incidence::of_lines`] for photons of given energies; those below the cut-off deposit nothing.
     pub fn of_energies(&self, energies_kev: &[f32], photons: &[f32]) -> Moments {
         self.sum(photons, |chunk| {
             let (mut attenuation, mut left) = ([[0.0; WIDTH]; 2], [[0.0; WIDTH]; 2]);
@@ -146,7 +146,7 @@ impl Incidence<'_> {
         })
     }
 
-    /// Moments of the energy that one photon leaves.
+    /// Moments of the energy deposited by one photon.
     pub fn of_energy(&self, energy_kev: f64) -> Moments {
         let Photon {
             attenuation: [strip, space],
@@ -182,7 +182,7 @@ impl Incidence<'_> {
         }
     }
 
-    /// Photons times the grid's transmission times what is left behind it, summed in fixed order; `of` gives attenuation and
+    /// Sums photons times the grid's transmission times the deposited energy, in fixed order; `of` returns attenuation and
     /// moments of [`WIDTH`] photons.
     #[inline(always)]
     fn sum(&self, photons: &[f32], of: impl Fn(usize) -> ([Lanes; 2], [Lanes; 2])) -> Moments {
@@ -229,7 +229,7 @@ mod tests {
         [Receptor::default(), real]
     }
 
-    /// Both tables against the response itself, away from the edges (33.2, 36.0 and 88.0 keV) and at lines beside one, from steep to
+    /// Both tables against the response itself, away from the edges (33.2, 36.0 and 88.0 keV) and at lines next to one, from steep to
     /// grazing incidence.
     #[test]
     fn tables_have_the_moments_of_the_response() {

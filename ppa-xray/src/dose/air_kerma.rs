@@ -8,12 +8,12 @@ use crate::matter::material::Material;
 use crate::phantom::lattice::Walk;
 use crate::transport::tracking::{SOLID_G_CM3, Transport};
 
-/// Nodes per keV: linear interpolation then errs by less than 0.05 % at 5 keV, 1e-5 at 30 keV.
+/// Nodes per keV; the error of linear interpolation is then below 0.05 % at 5 keV and 1e-5 at 30 keV.
 const NODES_PER_KEV: usize = 8;
 
-/// Energy times mass energy-transfer coefficient of air, by energy.
+/// Energy times the mass energy-transfer coefficient of air, by energy.
 ///
-/// Electrons of these energies lose next to nothing as bremsstrahlung in air (0.03 % at 150 keV), so this is also the
+/// Electrons of these energies lose almost nothing to bremsstrahlung in air (0.03 % at 150 keV), so this is also the
 /// absorption coefficient.
 #[derive(Debug)]
 pub(crate) struct AirKerma {
@@ -47,8 +47,8 @@ fn air() -> Material {
 
 /// Air kerma free in air (no backscatter) where the central ray enters the patient, Gy per history.
 ///
-/// The patient begins at the first voxel on the central ray of more than 0.3 g/cm³; voxels before it attenuate. `None`
-/// when the central ray meets no such voxel before the detector plane, or is blocked by the collimator.
+/// The patient begins at the first voxel on the central ray denser than 0.3 g/cm³; the voxels before it attenuate. `None`
+/// if the central ray meets no such voxel before the detector plane or is blocked by the collimator.
 pub(crate) fn entrance_gy_per_history(transport: &Transport) -> Option<f64> {
     let phantom = &transport.tables.phantom;
     let (lattice, projection) = (&transport.lattice, transport.projection);

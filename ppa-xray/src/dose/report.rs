@@ -24,10 +24,10 @@ pub struct Imparted {
     pub ev_per_history: Estimate,
 }
 
-/// What the histories of one exposure left in the phantom, and air kerma.
+/// Energy imparted to the phantom by the histories of one exposure, and air kerma.
 ///
-/// Everything is per history; [`Dose::histories_per_mas`] times as much is per mAs. Electrons deposit where they are
-/// born, so kerma and dose are one in voxels larger than their range (0.3 mm of water at 150 keV).
+/// All values are per history; multiply by [`Dose::histories_per_mas`] for values per mAs. Electrons deposit their energy where
+/// they are set free, so kerma equals dose in voxels larger than their range (0.3 mm of water at 150 keV).
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Dose {
@@ -39,16 +39,16 @@ pub struct Dose {
     pub phantom: Imparted,
     /// By material, with its name, in the order of the phantom.
     pub materials: Vec<(String, Imparted)>,
-    /// The regions asked for, in their order.
+    /// Requested regions, in their order.
     pub regions: Vec<(VoxelBox, Imparted)>,
-    /// The labels asked for, in ascending order.
+    /// Requested labels, in ascending order.
     pub labels: Vec<(u8, Imparted)>,
-    /// The voxels asked for.
+    /// Requested voxels.
     pub voxels: Option<VoxelDose>,
     /// Air kerma free in air (without backscatter) where the central ray enters the patient, Gy per history: at the first
-    /// voxel of more than 0.3 g/cm³. `None` when the central ray meets none.
+    /// voxel denser than 0.3 g/cm³. `None` if the central ray meets no such voxel.
     pub entrance_air_kerma_gy_per_history: Option<f64>,
-    /// Air kerma of all that crosses the detector, averaged over its area, Gy per history. Photons at less than 6° to
+    /// Air kerma of all photons that cross the detector, averaged over its area, Gy per history. Photons at less than 6° to
     /// the plane count as at 3°.
     pub detector_air_kerma_gy_per_history: Estimate,
 }
@@ -56,13 +56,13 @@ pub struct Dose {
 /// Dose in a box of voxels, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelDose {
-    /// Which voxels.
+    /// The box of voxels.
     pub voxels: VoxelBox,
     /// Mass of each voxel, g.
     pub mass_g: Vec<f32>,
     /// Energy imparted to each voxel, eV per history.
     pub ev_per_history: Vec<f32>,
-    /// Its standard error.
+    /// Standard error of the energy imparted to each voxel, eV per history.
     pub ev_per_history_se: Vec<f32>,
 }
 
@@ -81,7 +81,7 @@ impl VoxelDose {
 }
 
 impl Estimate {
-    /// `sum` over `histories`, keV per history.
+    /// Converts `sum` over `histories` to keV per history.
     pub(crate) fn of(sum: Sum, histories: u64) -> Self {
         mean(sum.value as f64, sum.square as f64, histories)
     }

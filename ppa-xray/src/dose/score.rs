@@ -11,11 +11,11 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::nearest;
 
-/// Cosine below which a photon counts as one of half of it, so that grazing ones do not ruin the variance: the mean of
-/// 1/cos over an even angular flux (Clark, Nucl. Sci. Eng. 27 (1967) 235).
+/// Cosine below which a photon counts with half this cosine, so that grazing photons do not ruin the variance: the mean of
+/// 1/cos over a uniform angular flux (Clark, Nucl. Sci. Eng. 27 (1967) 235).
 const GRAZING_COS: f64 = 0.1;
 
-/// What scorers of one simulation share.
+/// Data shared by the scorers of one simulation.
 pub(crate) struct DoseTarget<'a> {
     pub phantom: &'a VoxelPhantom,
     pub regions: &'a [VoxelBox],
@@ -27,19 +27,19 @@ pub(crate) struct DoseTarget<'a> {
     pub raster: Raster,
 }
 
-/// A scorer of the image that counts the dose as well.
+/// An image scorer that also counts the dose.
 pub(crate) struct DoseScore<'a, I> {
     image: I,
     target: &'a DoseTarget<'a>,
     /// Sums since the scorer was made.
     sums: DoseSums,
-    /// (voxel, energy steps) of the history in each slot.
+    /// (voxel, energy steps) deposited by the history in each slot.
     slots: Vec<Vec<(usize, u64)>>,
     /// Energy steps of one history by material; zero between histories.
     materials: Vec<u64>,
-    /// The same by region.
+    /// Energy steps of one history by region.
     regions: Vec<u64>,
-    /// The same by label.
+    /// Energy steps of one history by label.
     labels: Vec<u64>,
 }
 
@@ -59,7 +59,7 @@ impl<'a, I: Score> DoseScore<'a, I> {
         }
     }
 
-    /// Adds everything counted to the tally; all histories have ended.
+    /// Adds all counts to the tally; all histories must have ended.
     pub fn hand_in(self) {
         self.target.tally.hand_in(&self.sums);
     }
@@ -147,7 +147,7 @@ impl<I: Score> Score for DoseScore<'_, I> {
     }
 }
 
-/// Counts what one history left and clears it.
+/// Adds the deposits of one history to the sums and clears them.
 fn take_into(sums: &mut [Sum], steps: &mut [u64]) {
     for (sum, steps) in sums.iter_mut().zip(steps) {
         if *steps > 0 {

@@ -1,4 +1,4 @@
-//! Doses to be scored.
+//! Settings of the dose tally.
 
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use crate::dose::voxel_labels::VoxelLabels;
 use crate::setters::setters;
 
-/// What is counted besides the energy imparted to every material and to the whole phantom.
+/// Doses counted in addition to the energy imparted to every material and to the phantom.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct DoseSettings {
-    /// Boxes of voxels, each counted as a whole. They may overlap.
+    /// Boxes of voxels, each summed up. They may overlap.
     pub regions: Vec<VoxelBox>,
-    /// Labels of the voxels: those of every label but 0 are counted together. A mask has the label 1 where it is set.
+    /// Labels of the voxels. Voxels with the same label are summed up; label 0 is not counted. A mask has the label 1 where it is set.
     pub labels: Option<VoxelLabels>,
     /// Box whose voxels are counted one by one; 16 bytes per voxel.
     pub voxels: Option<VoxelBox>,
@@ -25,7 +25,7 @@ pub struct DoseSettings {
 pub struct VoxelBox {
     /// First voxel (i, j, k).
     pub low: [usize; 3],
-    /// One beyond the last voxel.
+    /// One past the last voxel.
     pub high: [usize; 3],
 }
 
@@ -33,7 +33,7 @@ pub struct VoxelBox {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DoseError {
-    /// A box is empty or leaves the phantom.
+    /// A box is empty or extends beyond the phantom.
     #[error(
         "the dose region of voxels ({}, {}, {}) to ({}, {}, {}), exclusive, is empty or extends beyond the phantom of {} x {} x {} voxels",
         low[0], low[1], low[2], high[0], high[1], high[2], size[0], size[1], size[2]
@@ -41,12 +41,12 @@ pub enum DoseError {
     Box {
         /// First voxel.
         low: [usize; 3],
-        /// One beyond the last voxel.
+        /// One past the last voxel.
         high: [usize; 3],
         /// Voxels of the phantom.
         size: [usize; 3],
     },
-    /// Not as many labels as voxels.
+    /// The numbers of labels and voxels differ.
     #[error(
         "the dose is requested with {found} labels, expected one for each of {expected} voxels"
     )]
@@ -78,13 +78,13 @@ impl VoxelBox {
         [0, 1, 2].map(|axis| self.high[axis] - self.low[axis])
     }
 
-    /// Number of voxels, unless it is beyond all memory.
+    /// Number of voxels, or `None` on overflow.
     pub(crate) fn count(&self) -> Option<usize> {
         let [i, j, k] = self.size();
         i.checked_mul(j)?.checked_mul(k)
     }
 
-    /// Place of a voxel in the box, first axis fastest.
+    /// Index of a voxel in the box, first axis fastest.
     #[inline]
     pub(crate) fn index(&self, voxel: [usize; 3]) -> Option<usize> {
         let inside =

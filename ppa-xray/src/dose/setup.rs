@@ -1,4 +1,4 @@
-//! Regions of a dose tally (names, masses, geometry), and conversion of its sums to doses.
+//! Regions of a dose tally (names, masses, geometry), and conversion of the sums to doses.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use crate::matter::energy_transfer::GRAY_PER_KEV_G;
 use crate::phantom::voxels::voxel_mm3;
 use crate::transport::tracking::Transport;
 
-/// What does not depend on the histories: names, masses, geometry.
+/// Data that do not depend on the histories: names, masses, geometry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct DoseSetup {
     phantom_g: f64,
@@ -19,7 +19,7 @@ pub(crate) struct DoseSetup {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     labels: Vec<(u8, f64)>,
     voxels: Option<VoxelBox>,
-    /// Of the voxels; kept apart from the numbers that are written as text.
+    /// Masses of the voxels; kept apart from the numbers that are written as text.
     #[serde(skip)]
     pub voxel_g: Vec<f32>,
     entrance_air_kerma_gy_per_history: Option<f64>,
@@ -28,7 +28,7 @@ pub(crate) struct DoseSetup {
 
 impl DoseSetup {
     /// # Errors
-    /// [`DoseError`] for a box that leaves the phantom.
+    /// [`DoseError`] for a box that extends beyond the phantom.
     pub fn new(transport: &Transport, settings: &DoseSettings) -> Result<Self, DoseError> {
         let phantom = &transport.tables.phantom;
         let grid = phantom.grid();
@@ -89,7 +89,7 @@ impl DoseSetup {
         )
     }
 
-    /// The labels that are counted, in their order.
+    /// The counted labels, in their order.
     pub fn labels(&self) -> Vec<u8> {
         self.labels.iter().map(|(label, _)| *label).collect()
     }
@@ -98,7 +98,7 @@ impl DoseSetup {
         self.regions.iter().map(|(region, _)| *region).collect()
     }
 
-    /// Bytes of masses and sums in a file, unless they are beyond all memory or a box makes no sense.
+    /// Bytes of masses and sums in a file, or `None` if they overflow or a box is invalid.
     pub fn byte_len(&self) -> Option<u64> {
         let possible = |voxels: &VoxelBox| {
             let ordered = (0..3).all(|axis| voxels.low[axis] < voxels.high[axis]);
@@ -115,12 +115,12 @@ impl DoseSetup {
         voxels.checked_mul(4 + 16)?.checked_add(few)
     }
 
-    /// Voxels that are counted one by one.
+    /// Number of voxels that are counted one by one.
     pub fn voxel_count(&self) -> usize {
         self.voxels.and_then(|voxels| voxels.count()).unwrap_or(0)
     }
 
-    /// The doses of `histories`.
+    /// Converts the sums of `histories` to doses.
     pub fn report(
         &self,
         tally: &DoseTally,

@@ -20,14 +20,14 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
-    /// Counts what one history left, in steps of [`STEPS_PER_KEV`].
+    /// Adds the energy of one history, in steps of [`STEPS_PER_KEV`].
     #[inline]
     pub fn count(&mut self, steps: u64) {
         self.value += u128::from(steps);
         self.square += u128::from(square_steps(steps));
     }
 
-    /// `None` on overflow, which honest tallies never reach.
+    /// Adds two sums; `None` on overflow, which valid tallies never reach.
     pub fn checked_add(self, other: Self) -> Option<Self> {
         Some(Self {
             value: self.value.checked_add(other.value)?,
@@ -36,21 +36,21 @@ impl Sum {
     }
 }
 
-/// The square of an energy in steps of [`STEPS_PER_KEV`], in steps of [`STEPS_PER_KEV2`].
+/// Square of an energy in steps of [`STEPS_PER_KEV`], given in steps of [`STEPS_PER_KEV2`].
 #[inline]
 pub(crate) fn square_steps(steps: u64) -> u64 {
     let kev = steps as f64 / STEPS_PER_KEV;
     nearest(kev * kev * STEPS_PER_KEV2)
 }
 
-/// What all histories left in the phantom, and what passed the detector plane.
+/// Energy imparted to the phantom by all histories, and kerma at the detector plane.
 #[derive(Debug)]
 pub(crate) struct DoseTally {
     sums: Mutex<DoseSums>,
     voxels: Option<(VoxelBox, Vec<[AtomicU64; 2]>)>,
 }
 
-/// The sums of the quantities that are few.
+/// Sums of everything but the single voxels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DoseSums {
     /// The whole phantom.
@@ -92,7 +92,7 @@ impl DoseSums {
             .chain(&mut self.labels)
     }
 
-    /// `None` on overflow.
+    /// Adds the other sums; `None` on overflow.
     fn add(&mut self, other: &Self) -> Option<()> {
         for (sum, other) in self.each_mut().zip(other.each()) {
             *sum = sum.checked_add(*other)?;
@@ -112,14 +112,14 @@ impl DoseTally {
         }
     }
 
-    /// Adds what one task has counted; integers, so the order of tasks does not matter.
+    /// Adds the counts of one task. They are integers, so the order of tasks does not matter.
     pub fn hand_in(&self, sums: &DoseSums) {
         let mut all = self.sums.lock().expect("no task panics with the lock");
         all.add(sums)
             .expect("2¹²⁸ steps are more than all histories leave");
     }
 
-    /// Counts the energy that one history left in a voxel; outside the box nothing happens.
+    /// Counts the energy that one history left in a voxel; voxels outside the box are ignored.
     #[inline]
     pub fn score_voxel(&self, voxel: [usize; 3], steps: u64) {
         let Some((voxels, sums)) = &self.voxels else {
@@ -153,14 +153,14 @@ impl DoseTally {
             .collect()
     }
 
-    /// Bytes of [`DoseTally::to_bytes`].
+    /// Number of bytes of [`DoseTally::to_bytes`].
     pub fn byte_len(&self) -> usize {
         let sums = self.sums();
         let voxels = self.voxels.as_ref().map_or(0, |(_, sums)| sums.len());
         32 * sums.each().count() + 16 * voxels
     }
 
-    /// All sums, little-endian.
+    /// Serialises all sums, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.byte_len());
         for sum in self.sums().each() {
@@ -174,7 +174,7 @@ impl DoseTally {
         bytes
     }
 
-    /// Adds the sums of [`DoseTally::to_bytes`] of a tally of the same shape; `None` on overflow.
+    /// Adds the sums of [`DoseTally::to_bytes`] from a tally of the same shape; `None` on overflow.
     pub fn add_bytes(&mut self, bytes: &[u8]) -> Option<()> {
         assert_eq!(bytes.len(), self.byte_len(), "tallies of one shape");
         let sums = self.sums.get_mut().expect("no task panics with the lock");

@@ -4,23 +4,23 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A label for every voxel of a phantom, first axis fastest; 0 stands for none.
+/// A label for every voxel of a phantom, first axis fastest; 0 means no label.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct VoxelLabels(pub Vec<u8>);
 
-/// The labels are many: only their number is shown.
+/// Shows only the number of labels, since there are many.
 impl fmt::Debug for VoxelLabels {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "VoxelLabels({} voxels)", self.0.len())
     }
 }
 
-/// The labels that occur, with a number for each.
+/// The labels in use, with a number for each.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LabelNumbers([Option<u8>; 256]);
 
 impl VoxelLabels {
-    /// The labels that occur, in ascending order, without 0.
+    /// The labels in use, in ascending order, without 0.
     pub(crate) fn found(&self) -> Vec<u8> {
         let mut occurs = [false; 256];
         for &label in &self.0 {
@@ -42,12 +42,12 @@ impl LabelNumbers {
         Self(numbers)
     }
 
-    /// How many labels have a number.
+    /// Number of labels that have a number.
     pub fn count(&self) -> usize {
         self.0.iter().flatten().count()
     }
 
-    /// Number of a label, if it was among them.
+    /// Number of a label, or `None` if it is not in use.
     #[inline]
     pub fn get(&self, label: u8) -> Option<usize> {
         self.0[usize::from(label)].map(usize::from)

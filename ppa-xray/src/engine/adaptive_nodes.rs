@@ -1,4 +1,4 @@
-//! Adaptive grid of next-event estimators: nodes of single scatter, closer together where the field has curvature.
+//! Adaptive grid of next-event estimators: nodes of single scatter, denser where the field has curvature.
 //!
 //! docs/physics.md, "Fast engine", single scatter. A node is inserted where cubic interpolation from its neighbours misses the estimate
 //! by more than the tolerance.
@@ -14,22 +14,22 @@ use crate::engine::scatter_field::ScatterField;
 use crate::engine::single_scatter::{NodeEstimate, PointSampling, Scratch, SingleScatter};
 use crate::transport::tally::Moments;
 
-/// Error of the interpolation, relative to the whole signal, beyond which nodes are set closer.
+/// Interpolation error, relative to the total signal, above which nodes are refined.
 const BEND: f64 = 2e-3;
 
-/// The same relative to the scatter alone: in a bright place the signal hides much, but sums of a category do not.
+/// The same relative to the scatter alone: in a bright place the signal hides much, but not in the sums of a category.
 const OWN_BEND: f64 = 2e-2;
 
-/// Share of the open field from which on fewer collisions will do: the error that the noise of the exposure allows is
-/// proportional to the root of the signal.
+/// Share of the open field above which fewer collisions suffice: the error permitted by the noise of the exposure is
+/// proportional to the square root of the signal.
 const DARK: f64 = 0.2;
 
 /// Fewest collisions in bright places, as a share of those in dark ones.
 const BRIGHT: f64 = 0.125;
 
-/// Compton and Rayleigh scatter over the detector, and the largest share of a node that a single collision added.
+/// Compton and Rayleigh scatter over the detector, and the largest share of a node from a single collision.
 ///
-/// Nodes are `step_mm` apart, and half as far where the one between four neighbours is not what they predict. A node in the dark
+/// Nodes are `step_mm` apart, or half as far where the node between four neighbours differs from their prediction. A node in the dark
 /// samples `collisions` collisions per list on average.
 pub(crate) fn single_scatter_field(
     scatter: &SingleScatter,
@@ -88,7 +88,7 @@ pub(crate) fn single_scatter_field(
     ([field(0), field(1)], largest_share)
 }
 
-/// Nodes of the refined grid that are not among the old ones and lie beside a bent one.
+/// Nodes of the refined grid that are new and next to a bent node.
 fn new_nodes_beside(grid: &NodeGrid, bent: &[bool]) -> Vec<usize> {
     let fine = grid.refined();
     (0..fine.nodes())
@@ -113,11 +113,11 @@ fn mean_kev(node: &NodeEstimate) -> f64 {
     node.estimates.iter().map(both).sum::<f64>() / ESTIMATES as f64
 }
 
-/// Nodes where the field bends too much for this grid.
+/// Nodes at which the field bends too much for this grid.
 ///
 /// The middle of four nodes in a row, at -3, -1, 1, 3 steps, is (-1, 9, 9, -1)/16 of them up to an error that falls with
-/// the fourth power of the step; at kinks with the first. A quarter of it is what half the distance is taken to leave.
-/// Beside the rim the four are at -1, 1, 2, 3 steps.
+/// the fourth power of the step, or at kinks with the first. The error at half the distance is assumed to be a quarter of it.
+/// Next to the rim the four are at -1, 1, 2, 3 steps.
 fn bent_nodes(grid: &NodeGrid, nodes: &[NodeEstimate], primary: &PrimarySignal) -> Vec<bool> {
     let values: Vec<f64> = nodes.iter().map(mean_kev).collect();
     let cm2 = primary.detector.pixel_cm2();
@@ -152,7 +152,7 @@ fn bent_nodes(grid: &NodeGrid, nodes: &[NodeEstimate], primary: &PrimarySignal) 
         .collect()
 }
 
-/// Every estimate between the nodes.
+/// Interpolates every estimate between the nodes.
 fn interpolated(grid: &NodeGrid, nodes: &[NodeEstimate]) -> Vec<NodeEstimate> {
     let interpolation = grid.to_refined();
     let mut fine = vec![NodeEstimate::default(); grid.refined().nodes()];
@@ -184,7 +184,7 @@ mod tests {
 
     use super::*;
 
-    /// Which nodes of a detector of 200 mm, 20 mm apart, bend under a signal of `primary` open fields.
+    /// Returns the nodes of a detector of 200 mm, 20 mm apart, that bend under a signal of `primary` open fields.
     fn bent(primary: f64, scatter: impl Fn(Point2<f64>) -> f64) -> Vec<[usize; 2]> {
         let detector = Detector::centred(20, 20, 10.0);
         let kev = |mean_kev: f64| Moments {
@@ -210,7 +210,7 @@ mod tests {
             .collect()
     }
 
-    /// 30 mm into the detector scatter has fallen to what it is everywhere else: only the nodes beside that rim see it.
+    /// The scatter falls within 30 mm of the edge to its constant value elsewhere; only the nodes next to that edge notice.
     #[test]
     fn bends_beside_every_rim_are_seen() {
         for (axis, sign, beside) in [(0, 1.0, 1), (0, -1.0, 9), (1, 1.0, 1), (1, -1.0, 9)] {
@@ -233,8 +233,8 @@ mod tests {
         }
     }
 
-    /// The open field is a hundred times as bright as the scatter; a bend of a tenth of the scatter is hidden from the
-    /// image, not from the sum of the category.
+    /// The open field is a hundred times as bright as the scatter. A bend of a tenth of the scatter is hidden from the
+    /// image, but not from the sum of the category.
     #[test]
     fn bends_of_scatter_are_seen_in_bright_places() {
         let ridge = |height: f64| bent(1.0, |at| 0.01 * (1.0 + height * f64::from(at.x == 0.0)));
@@ -242,7 +242,7 @@ mod tests {
         assert!(ridge(0.05).is_empty());
     }
 
-    /// Four nodes in a row meet cubics, beside the rim as elsewhere.
+    /// Four nodes in a row reproduce cubics, at the rim as elsewhere.
     #[test]
     fn cubics_need_no_closer_nodes() {
         let found = bent(0.0, |at| {

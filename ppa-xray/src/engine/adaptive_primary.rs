@@ -17,37 +17,37 @@ use crate::phantom::interpolation::Interpolation;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
 
-/// Largest second difference between neighbouring pixels for which the centre of a pixel stands for the whole, relative.
+/// Largest relative second difference between neighbouring pixels for which the centre of a pixel represents the pixel.
 ///
-/// Where the image bends evenly the correction with it is exact; a [`KINK`] in the centre of a pixel leaves an eighth.
+/// If the image bends uniformly the correction by it is exact; a [`KINK`] in the centre of a pixel leaves an eighth.
 const EVEN: f64 = 4e-3;
 
-/// Share of the second difference that is left in a pixel with a kink in its centre, as homogeneous voxels have them.
+/// Share of the second difference that remains in a pixel with a kink in its centre, as with homogeneous voxels.
 const KINK: f64 = 0.125;
 
-/// Second difference beyond which there may be an edge.
+/// Second difference above which there may be an edge.
 const EDGE: f64 = 2e-2;
 
-/// A rectangle is cut as long as opposite quarters differ from its centre by more than this share of the pixel.
+/// A rectangle is divided as long as opposite quarters differ from its centre by more than this share of the pixel.
 const TOLERANCE: f64 = 3e-3;
 
-/// [`EVEN`] and [`TOLERANCE`] are at least these shares of the quantum noise of a pixel: the rms error of the rays is then a few hundredths
-/// of the noise.
+/// [`EVEN`] and [`TOLERANCE`] are at least these shares of the quantum noise of a pixel; the rms error of the rays is then a few
+/// hundredths of the noise.
 const EVEN_NOISE: f64 = 0.8;
 const TOLERANCE_NOISE: f64 = 0.4;
 
 /// Points per side of the focal spot over which fluence and response of the detector, which vary slowly, are averaged.
 const OPEN_POINTS: usize = 2;
 
-/// How far the penumbra of an edge reaches, in its standard deviations, and how far it may reach beyond a pixel before the
-/// pixels next to it are looked at for edges, in pixels: an edge nearer than the next centre shows in the pixel's own second difference.
+/// Extent of the penumbra of an edge, in its standard deviations, and the extent beyond a pixel above which the
+/// next pixels are checked for edges, in pixels: an edge nearer than the next centre shows in the pixel's own second difference.
 const REACH: f64 = 3.0;
 const NEAR: f64 = 0.5;
 
 /// First two moments per history of the primary energy in every pixel.
 ///
 /// One ray through the centre where the image is smooth, up to `samples_per_side`² where it is not and the quantum noise of an exposure
-/// of `histories` does not exceed the error. An extended focal spot takes no more rays: each leaves from another place of the spot.
+/// of `histories` does not exceed the error. An extended focal spot needs no additional rays: each starts from another point of the spot.
 pub(crate) fn primary_moments(
     exposure: &Exposure,
     paths: &Paths,
@@ -74,7 +74,7 @@ pub(crate) fn primary_moments(
     let columns = transport.projection.detector.columns as usize;
     let rows = transport.projection.detector.rows as usize;
     let phase = monitor.phase(0.0..PRIMARY_DONE, 2 * rows);
-    // Counts a row at its first pixel.
+    // A row is counted at its first pixel.
     let goes_on = |pixel: usize| {
         if pixel.is_multiple_of(columns) {
             phase.advance();
@@ -119,11 +119,11 @@ pub(crate) fn primary_moments(
     let shadow = shadow_sigma_pixels(transport, paths.nearest_z_mm());
     let reach = (REACH * shadow - NEAR).ceil().max(0.0) as usize;
     let fine = voxels_per_pixel <= finest;
-    // Half the square of the standard deviation is to the blur of an even bend what 1/24 is to the pixel.
+    // Half the squared standard deviation is to the blur of a uniform bend what 1/24 is to the pixel.
     let left = bend_left(interpolation, voxels_per_pixel);
     let even_share = KINK / (left + 0.5 * shadow * shadow);
-    // An edge may cut off a corner that the five rays of an uncut pixel miss, and a part of the spot that the 20 rays of its
-    // quarters miss: pixels at edges are always cut where the noise is below the tolerance.
+    // An edge may cut off a corner that the five rays of an undivided pixel miss, or a part of the spot that the 20 rays of its
+    // quarters miss. So pixels at edges are always divided where the noise is below the tolerance.
     let edge_cuts = if transport.emitter.spot().is_point() {
         1
     } else {
@@ -143,7 +143,7 @@ pub(crate) fn primary_moments(
         let worst = largest_about(&bends, pixel, columns, reach);
         let cm2 = area_cm2(lit);
         let noise = TOLERANCE_NOISE * relative_noise(middle, cm2, histories);
-        // The penumbra of blades has kinks at both ends, whatever the voxels are.
+        // The penumbra of blades has kinks at both ends, for any voxels.
         let even_share = if lies_within(&fully_lit, rays.pixel(pixel)) {
             even_share
         } else {
@@ -177,9 +177,9 @@ pub(crate) fn primary_moments(
     })
 }
 
-/// Share of the second difference that is left after the correction with it.
+/// Share of the second difference that remains after the correction by it.
 ///
-/// Between trilinear voxels there is no kink. Details of an image of theirs vary as (π x / voxel)², so the second difference misses
+/// Between trilinear voxels there is no kink. Details of their image vary as (π x / voxel)², so the second difference misses
 /// (π voxels per pixel)² / 12 of the second derivative, of which a pixel takes 1/24: less than a twentieth of the square.
 fn bend_left(interpolation: Interpolation, voxels_per_pixel: f64) -> f64 {
     match interpolation {
@@ -193,7 +193,7 @@ fn relative_noise(per_cm2: Moments, cm2: f64, histories: f64) -> f64 {
     (per_cm2.square_kev2 / (cm2 * histories)).sqrt() / per_cm2.mean_kev.max(f64::MIN_POSITIVE)
 }
 
-/// Second differences along x and y; none at the rim.
+/// Second differences along x and y; `None` at the rim.
 fn bend(values: &[Moments], pixel: usize, columns: usize) -> Option<[Moments; 2]> {
     let column = pixel % columns;
     let along = |before: Option<usize>, after: usize| {
@@ -209,7 +209,7 @@ fn bend(values: &[Moments], pixel: usize, columns: usize) -> Option<[Moments; 2]
     ])
 }
 
-/// The larger second difference over the value; infinite at the rim, where it is not known.
+/// The larger second difference relative to the value; infinite at the rim, where it is unknown.
 fn relative_bend(values: &[Moments], pixel: usize, columns: usize) -> f32 {
     let Some(bend) = bend(values, pixel, columns) else {
         return f32::INFINITY;
@@ -221,7 +221,7 @@ fn relative_bend(values: &[Moments], pixel: usize, columns: usize) -> f32 {
     (larger / values[pixel].mean_kev) as f32
 }
 
-/// The largest value of the pixels up to `reach` away; infinite if the detector ends before.
+/// The largest value of the pixels up to `reach` away; infinite if the detector ends before that.
 fn largest_about(values: &[f32], pixel: usize, columns: usize, reach: usize) -> f64 {
     let (column, row) = (pixel % columns, pixel / columns);
     let rows = values.len() / columns;
@@ -234,7 +234,7 @@ fn largest_about(values: &[f32], pixel: usize, columns: usize, reach: usize) -> 
     largest.copied().fold(0.0_f32, f32::max).into()
 }
 
-/// Whether a field holds all of a pixel and of its neighbours.
+/// Whether a field contains all of a pixel and of its neighbours.
 fn lies_within(field: &Field, pixel: Field) -> bool {
     (0..2).all(|axis| {
         let side = pixel.size_mm()[axis];
@@ -243,7 +243,7 @@ fn lies_within(field: &Field, pixel: Field) -> bool {
     })
 }
 
-/// Pixel side over the smallest side of a voxel up to which neighbouring centres miss nothing.
+/// Ratio of pixel side to smallest voxel side up to which neighbouring centres miss nothing.
 fn finest_detail(interpolation: Interpolation) -> f64 {
     match interpolation {
         Interpolation::Nearest => 0.5,
@@ -251,13 +251,13 @@ fn finest_detail(interpolation: Interpolation) -> f64 {
     }
 }
 
-/// Pixel side over the smallest side of a voxel.
+/// Ratio of pixel side to smallest voxel side.
 fn voxels_per_pixel(transport: &Transport) -> f64 {
     let spacing_mm = transport.tables.phantom.grid().spacing_mm().min();
     transport.projection.detector.pixel_mm / spacing_mm
 }
 
-/// Standard deviation of the penumbra of what lies at z = `nearest_mm` from the focal spot, in pixels.
+/// Standard deviation of the penumbra of objects at z = `nearest_mm` from the focal spot, in pixels.
 fn shadow_sigma_pixels(transport: &Transport, nearest_mm: f64) -> f64 {
     let projection = transport.projection;
     let magnification = projection.source_detector_mm / nearest_mm.max(1.0);
@@ -265,17 +265,17 @@ fn shadow_sigma_pixels(transport: &Transport, nearest_mm: f64) -> f64 {
     sigma_mm * (magnification - 1.0).max(0.0) / projection.detector.pixel_mm
 }
 
-/// How a pixel is cut.
+/// Rules for dividing a pixel.
 struct Cut<'a> {
     rays: &'a PrimaryRays<'a>,
-    /// Strips of the focal spot, for every number of cuts twice as many.
+    /// Strips of the focal spot, twice as many for every further division.
     strips_mm: &'a [Vec<f64>],
-    /// Cuts that are made in any case: a square wider than a voxel may hide one.
+    /// Divisions that are always made: a square wider than a voxel may hide one.
     sure: usize,
     tolerance_kev: f64,
 }
 
-/// A part of a pixel, and the strips of the focal spot, or of what lights the place of it, that the ray to its centre leaves from.
+/// A part of a pixel, and the strips of the focal spot, or of its part that lights the point, from which the ray to its centre starts.
 #[derive(Clone, Copy)]
 struct Part {
     field: Field,
@@ -284,9 +284,9 @@ struct Part {
 }
 
 impl Part {
-    /// The quarter that lies on the upper side in x and in y, or on the lower.
+    /// The quarter on the upper or the lower side in x and in y.
     ///
-    /// Of 4ⁿ quarters of quarters each is seen from another of 4ⁿ places of the spot, and the four of a rectangle from one in each
+    /// Each of the 4ⁿ quarters of quarters is seen from another of 4ⁿ points of the spot, and the four of a rectangle from one in each
     /// quarter of the spot: the spot's quarters are the pixel's in reverse order, as in the set of Hammersley, Ann. N. Y. Acad.
     /// Sci. 86 (1960) 844. They are rotated by a right angle, so that a step on the spot does not cancel the step in the pixel.
     fn quarter(&self, [upper_x, upper_y]: [bool; 2]) -> Self {
@@ -310,8 +310,8 @@ impl Part {
 }
 
 impl Cut<'_> {
-    /// Energy in a part whose ray reads `middle`; it is cut into four until both pairs of opposite quarters agree with it: on
-    /// a plane they do, at an edge or a kink at least one pair does not.
+    /// Energy in a part whose ray reads `middle`. It is divided into four until both pairs of opposite quarters agree with it: this is so
+    /// on a plane, while at an edge or a kink at least one pair differs.
     fn refined(&self, part: Part, middle: Moments, scratch: &mut Scratch) -> Moments {
         let cm2 = area_cm2(part.field);
         if part.cuts + 1 == self.strips_mm.len() {
@@ -342,7 +342,7 @@ impl Cut<'_> {
         if lit == 0.0 {
             return Moments::default();
         }
-        // In a penumbra the strips divide the part of the spot that lights the place: dark strips would end the cuts too early.
+        // In a penumbra the strips divide the part of the spot that lights the point; with dark strips the division would end too early.
         let spot = emitter.spot();
         let offsets_mm =
             [0, 1].map(|axis| spot.strip_of_part_mm(lit_part[axis], part.strips[axis], strips_mm));
@@ -361,7 +361,7 @@ mod tests {
     use crate::engine::spectral_quadrature::compressed;
     use crate::matter::compton::ComptonModel;
 
-    /// An exposure with noise takes fewer rays than the expected image, with pixels of two voxels and of a fifth: the images differ, by
+    /// An exposure with noise takes fewer rays than the expected image, with pixels of two voxels and of a fifth; the images differ by
     /// less than a tenth of the noise.
     #[test]
     fn errors_of_fewer_rays_are_below_a_tenth_of_the_noise() {

@@ -41,7 +41,7 @@ pub struct AnalogSettings {
 }
 
 impl Default for AnalogSettings {
-    /// A minute or less: scatter to a few percent in a square centimetre.
+    /// Takes a minute or less: scatter to a few percent in a square centimetre.
     fn default() -> Self {
         Self {
             histories: 20_000_000,
@@ -51,17 +51,17 @@ impl Default for AnalogSettings {
     }
 }
 
-/// Histories that one task follows: long enough to hide the hand-over.
+/// Histories per task: long enough to hide the cost of starting a task.
 const BATCH: u64 = 16_384;
 
 /// Simulates a radiograph photon by photon.
 ///
 /// Photons leave the focal spot into the field, with energies from `spectrum`, and are followed through the voxels
-/// (vacuum outside) until they are absorbed, fall below 5 keV, or cross the detector plane. There grid and converter
-/// decide how much energy stays; nothing comes back from behind the plane.
+/// (vacuum outside) until they are absorbed, fall below 5 keV, or cross the detector plane. There, grid and converter
+/// determine the deposited energy. Nothing is scattered back from behind the plane.
 ///
 /// # Errors
-/// [`TransportError`] when the geometry, the spectrum or the number of histories makes no sense.
+/// [`TransportError`] if the geometry, the spectrum or the number of histories is invalid.
 pub fn analog(
     phantom: &VoxelPhantom,
     spectrum: &Spectrum,
@@ -81,7 +81,7 @@ setters!(AnalogSettings {
 });
 
 impl AnalogSettings {
-    /// Most histories of a run; no sum overflows, even if all of them meet in one pixel.
+    /// Largest number of histories of a run. No sum overflows, even if all of them hit one pixel.
     pub const MOST_HISTORIES: u64 = MOST_HISTORIES;
 
     pub(crate) fn validate(&self) -> Result<(), TransportError> {
@@ -96,14 +96,14 @@ impl AnalogSettings {
     }
 }
 
-/// Follows all histories and counts what arrives on `raster`.
+/// Follows all histories and counts the arrivals on `raster`.
 pub(crate) fn run(exposure: &Exposure, raster: Raster, settings: &AnalogSettings) -> Tally {
     let tally = Tally::new(raster);
     count(exposure, settings.seed, 0..settings.histories, &tally);
     tally
 }
 
-/// Follows `histories` and counts what arrives.
+/// Follows `histories` and counts the arrivals.
 pub(crate) fn count(exposure: &Exposure, seed: u64, histories: Range<u64>, tally: &Tally) {
     in_batches(exposure, histories, |batch| {
         let mut score = DetectorScore::new(exposure, tally);
@@ -111,7 +111,7 @@ pub(crate) fn count(exposure: &Exposure, seed: u64, histories: Range<u64>, tally
     });
 }
 
-/// Follows `histories` and counts what arrives and what stays.
+/// Follows `histories` and counts the arrivals and the deposited energy.
 pub(crate) fn count_with_dose(
     exposure: &Exposure,
     seed: u64,
@@ -126,7 +126,7 @@ pub(crate) fn count_with_dose(
     });
 }
 
-/// Deals `histories` out to the threads.
+/// Distributes `histories` over the threads.
 fn in_batches(exposure: &Exposure, histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
     exposure.transport.tables.majorants();
     let batches = (histories.end - histories.start).div_ceil(BATCH);
@@ -136,11 +136,11 @@ fn in_batches(exposure: &Exposure, histories: Range<u64>, follow: impl Fn(Range<
     });
 }
 
-/// Counts what photons leave in the detector, nothing else.
+/// Counts only the energy that photons deposit in the detector.
 struct DetectorScore<'a> {
     marker: Option<SideMarker>,
     response: &'a Response,
-    /// How photons are displaced before they are counted, and the raster that they stay in.
+    /// Displacement of photons before they are counted, and the raster that they stay in.
     displacement: Option<(&'a Displacement, Raster)>,
     /// Side of the square over which a photon's energy is spread, in pixels.
     spot_pixels: f64,

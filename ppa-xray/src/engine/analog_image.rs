@@ -1,4 +1,4 @@
-//! From the tally of the analog engine to a radiograph.
+//! Conversion of the tally of the analog engine to a radiograph.
 //!
 //! docs/physics.md, "Analog engine and dose".
 
@@ -11,7 +11,7 @@ use crate::engine::exposure::Exposure;
 use crate::image::radiograph::{CategorySums, Engine, Radiograph};
 use crate::transport::tally::{Category, Tally};
 
-/// What turns the sums of the image into a radiograph.
+/// Data that convert the sums of the image to a radiograph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ImageSetup {

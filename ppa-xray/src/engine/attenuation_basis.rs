@@ -1,15 +1,15 @@
 //! The attenuation of all materials as mixtures of a few of them.
 //!
-//! Bone between spongy and compact is a mixture of soft tissue and cortical bone, and so is its attenuation; the attenuation of every tissue is
-//! nearly a combination of the same two or three smooth functions of energy (Alvarez and Macovski, Phys. Med. Biol. 21 (1976) 733). A ray therefore
-//! need not accumulate the masses of 27 materials separately, but only those of four.
+//! Bone between spongy and compact is a mixture of soft tissue and cortical bone, and so is its attenuation; the attenuation of every
+//! tissue is nearly a combination of the same two or three smooth functions of energy (Alvarez and Macovski, Phys. Med. Biol. 21 (1976)
+//! 733). A ray therefore needs to accumulate the masses of only four materials instead of 27.
 //! docs/physics.md, "Fast engine", primary.
 
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::transport::attenuation::Attenuation;
 use crate::vector_math::{WIDTH, pad};
 
-/// Basis materials are counted in groups of this many, one SIMD register of numbers.
+/// Number of basis materials per group, one SIMD register.
 pub(crate) const LANES: usize = 4;
 
 /// Nodes per keV of the table of the basis.
@@ -18,24 +18,24 @@ const NODES_PER_KEV: usize = 8;
 /// Largest weighted relative error of a material's attenuation at any energy. Rounding of the tables is about 1e-6.
 const TOLERANCE: f64 = 1e-4;
 
-/// Energy from which relative errors count in full, keV.
+/// Energy above which relative errors have full weight, keV.
 const FULL_WEIGHT_KEV: f64 = 20.0;
 
-/// Every material as a sum of basis materials.
+/// Represents every material as a sum of basis materials.
 #[derive(Debug)]
 pub(crate) struct AttenuationBasis {
-    /// Groups of [`LANES`] basis materials.
+    /// Number of groups of [`LANES`] basis materials.
     pub groups: usize,
-    /// How much of each basis material a gram of a material counts as; material by material.
+    /// Grams of each basis material per gram of a material; material by material.
     shares: Vec<[f32; LANES]>,
     /// Attenuation of the basis materials, mm⁻¹ per g/cm³; node by node.
     table: Vec<[f32; LANES]>,
 }
 
 impl AttenuationBasis {
-    /// The basis of `materials` materials.
+    /// Builds the basis of `materials` materials.
     ///
-    /// Takes the material that is worst represented into the basis until all are represented.
+    /// Adds the material with the worst representation to the basis until all are represented.
     pub fn new(attenuation: &Attenuation, materials: usize) -> Self {
         let nodes = ((MAX_ENERGY_KEV - CUTOFF_KEV) * NODES_PER_KEV as f64).ceil() as usize + 1;
         let energy = |node: usize| CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64;
@@ -144,14 +144,14 @@ pub(crate) fn exponents(mass: &BasisMass, by_line: &[Vec<f32>], first: usize) ->
     exponents
 }
 
-/// Weight of a relative error at an energy: where attenuation is so strong that few photons get through, it matters less.
+/// Weight of a relative error at an energy; it is small where strong attenuation lets few photons through.
 fn weight(energy_kev: f64) -> f64 {
     (energy_kev / FULL_WEIGHT_KEV).powi(3).min(1.0)
 }
 
 /// Members of the basis, and every curve as a sum of them.
 ///
-/// Gram–Schmidt with the worst curve next; errors are relative, with the `weights` of the nodes.
+/// Gram–Schmidt that adds the worst curve next; errors are relative, with the `weights` of the nodes.
 fn represent(curves: &[Vec<f64>], weights: &[f64]) -> (Vec<usize>, Vec<Vec<f64>>) {
     let mut members = Vec::new();
     loop {
@@ -223,7 +223,7 @@ pub(crate) type BasisMass = [[f32; LANES]];
 /// Adds `amount` of a mixture of basis materials.
 #[inline(always)]
 pub(super) fn add(mass: &mut BasisMass, shares: &BasisMass, amount: f32) {
-    // One group is the common case: no loop.
+    // One group is the common case and needs no loop.
     if let ([mass], [share]) = (&mut *mass, shares) {
         for lane in 0..LANES {
             mass[lane] += share[lane] * amount;
@@ -244,7 +244,7 @@ mod tests {
     use crate::matter::material::Material;
     use crate::matter::sampler::MaterialTables;
 
-    /// Mixtures need no basis materials of their own, and every exponent is that of the masses themselves.
+    /// Mixtures need no basis materials of their own, and every exponent agrees with that of the masses themselves.
     #[test]
     fn a_few_materials_stand_for_all_their_mixtures() {
         let named = |name: &str| Material::named(name).unwrap();

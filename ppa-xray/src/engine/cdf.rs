@@ -4,18 +4,18 @@
 
 use std::ops::Range;
 
-/// An entry of running sums in strides.
+/// An entry found in strided cumulative sums.
 pub(super) struct Entry {
     pub index: usize,
-    /// The sum before it, and what it adds.
+    /// The sum before the entry, and its own contribution.
     pub low: f64,
     pub size: f64,
-    /// How far through the entry the target lies, 0 to 1.
+    /// Position of the target in the entry, 0 to 1.
     pub inside: f64,
 }
 
 impl Entry {
-    /// The entry among `range` that holds `target`; entry i ends with the sum at (i + 1) · stride − 1.
+    /// Returns the entry in `range` that contains `target`; entry i ends with the sum at (i + 1) · stride − 1.
     #[inline]
     pub fn find(sums: &[f64], stride: usize, range: Range<usize>, target: f64) -> Self {
         let end = |index: usize| sums[(index + 1) * stride - 1];
@@ -43,7 +43,7 @@ impl Entry {
 mod tests {
     use super::*;
 
-    /// Weights 1, 2, 3, 4, 5, 6 in three pairs: every target is in the entry whose share it lies in.
+    /// Weights 1, 2, 3, 4, 5, 6 in three pairs: every target is found in the entry whose share contains it.
     #[test]
     fn entries_are_found_by_their_share() {
         let sums = [1.0, 3.0, 6.0, 10.0, 15.0, 21.0];

@@ -45,7 +45,7 @@ pub(super) fn walk(
         let (first_x, first_y) = (x <= y && x <= z, y < x && y <= z);
         let next = x.min(y).min(z);
         let to = next.min(end).max(at);
-        // Rounding may lead a hair out of the lattice at its far side.
+        // Rounding may lead slightly out of the lattice at its far side.
         if index < 0 || index >= layer {
             return Step::Continue(());
         }
@@ -68,7 +68,7 @@ pub(super) fn walk(
     }
 }
 
-/// A length in counts; what is beyond any phantom stays so without overflow.
+/// Converts a length to counts; lengths beyond any phantom stay so without overflow.
 #[inline(always)]
 fn fixed(mm: f64) -> i64 {
     ((mm * (1.0 / MM)) as i64).min(i64::MAX / 4)

@@ -1,4 +1,4 @@
-//! Rays through the centres of pixels: on a lattice of pixels, and in between only where interpolation would not be accurate enough.
+//! Rays through the centres of pixels: on a lattice of pixels, and in between only where interpolation is not accurate enough.
 //!
 //! docs/physics.md, "Fast engine", primary.
 
@@ -6,14 +6,14 @@ use rayon::prelude::*;
 
 use crate::transport::tally::Moments;
 
-/// Largest step of a lattice, in pixels.
+/// Largest step of a lattice in pixels.
 const WIDEST: usize = 4;
 
-/// Error of cubic interpolation halfway between four nodes, as a share of the fourth difference about them, where the image is smooth: twice
-/// that of a polynomial of fourth degree.
+/// Error of cubic interpolation halfway between four nodes, as a share of the fourth difference around them, where the image is smooth:
+/// twice that of a polynomial of fourth degree.
 pub(super) const SMOOTH_ERROR: f64 = 3.0 / 64.0;
 
-/// The same where it has a kink, at most.
+/// Upper limit of the same at a kink.
 pub(super) const KINK_ERROR: f64 = 3.0 / 8.0;
 
 /// Weights of four nodes halfway between the inner two.
@@ -25,8 +25,8 @@ type Size = [usize; 2];
 /// Values at the centres of all pixels.
 ///
 /// Neighbours on the widest lattice are at most `most` pixels apart, on each following one half as far, and on the last one pixel. `of`
-/// gives the values of the pixels that a lattice adds; it may take them from the [`Between`] between the nodes of the wider
-/// lattice, which works where their fourth differences are below `tolerance`, a share of the value.
+/// returns the values of the pixels that a lattice adds; it may take them from [`Between`], which interpolates between the nodes of
+/// the wider lattice where their fourth differences are below `tolerance`, a share of the value.
 pub(super) fn values(
     size: Size,
     most: f64,
@@ -66,7 +66,7 @@ impl Lattice {
         }
     }
 
-    /// All nodes that are not those of a wider lattice.
+    /// All nodes that are not in a wider lattice.
     fn pixels(&self, wider: Option<&Self>) -> Vec<usize> {
         let along = |axis: usize| (0..self.size[axis]).step_by(self.step);
         let is_known = |[x, y]: [usize; 2]| {
@@ -108,7 +108,7 @@ impl Lattice {
         self.step * (at[0] + at[1] * self.size[0])
     }
 
-    /// Along an axis; none beside the rim, where it is not known.
+    /// Fourth difference along an axis; `None` next to the rim, where it is unknown.
     fn fourth_difference(&self, values: &[Moments], at: Size, axis: usize) -> Option<f64> {
         if at[axis] < 2 || at[axis] + 2 >= self.nodes[axis] {
             return None;
@@ -126,12 +126,12 @@ impl Lattice {
 pub(super) struct Between<'a> {
     lattice: Lattice,
     values: &'a [Moments],
-    /// Nodes about which interpolation will do.
+    /// Nodes around which interpolation is accurate enough.
     even: Vec<bool>,
 }
 
 impl Between<'_> {
-    /// The value of a pixel, if all nodes beside it are even and no moment becomes negative.
+    /// The value of a pixel, if all nodes next to it are even and no moment becomes negative.
     pub fn at(&self, pixel: usize) -> Option<Moments> {
         let Lattice { size, step, nodes } = self.lattice;
         let at = [pixel % size[0], pixel / size[0]];
@@ -171,7 +171,7 @@ mod tests {
     const SIZE: Size = [150, 90];
     const TOLERANCE: f64 = 1e-3;
 
-    /// Values that are found, and how many of them were traced, with neighbours at most `most` pixels apart.
+    /// Computed values and the number of traced ones, with neighbours at most `most` pixels apart.
     fn found(size: Size, most: f64, image: impl Fn([f64; 2]) -> f64) -> (Vec<Moments>, usize) {
         found_within(size, most, TOLERANCE, image)
     }

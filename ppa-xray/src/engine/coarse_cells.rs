@@ -19,7 +19,7 @@ pub(super) struct CoarseCells {
 }
 
 impl CoarseCells {
-    /// At most `most_cells` cubes.
+    /// Builds at most `most_cells` cubes.
     pub fn new(phantom: &VoxelPhantom, basis: &AttenuationBasis, most_cells: usize) -> Self {
         let voxels = phantom.grid().size();
         let mut edge = 1;

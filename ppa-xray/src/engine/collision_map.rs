@@ -1,8 +1,8 @@
-//! Importance sampling of the place of the first collision, from a map of cells over the irradiated body.
+//! Importance sampling of the position of the first collision, from a map of cells over the irradiated body.
 //!
 //! The density is the square root of the summed squared expected contributions to points of the detector, each in units of its
-//! tolerance, mixed with the scattered energy (defensive sampling): Kahn and Harris, NBS Appl. Math. Ser. 12 (1951) 27; Hesterberg,
-//! Technometrics 37 (1995) 185. docs/physics.md, "Fast engine", first collisions.
+//! tolerance, mixed with the number of scattered photons (defensive sampling): Kahn and Harris, NBS Appl. Math. Ser. 12 (1951) 27;
+//! Hesterberg, Technometrics 37 (1995) 185. docs/physics.md, "Fast engine", first collisions.
 
 use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
@@ -24,41 +24,41 @@ const CELLS: [usize; 3] = [40, 40, 16];
 /// Points per side of a cell at which the body is sampled.
 const POINTS: usize = 2;
 
-/// Share of the collisions that are drawn where most happen, whether they are important or not.
+/// Share of the collisions that are sampled by the number of scattered photons, regardless of importance.
 const DEFENSIVE_SHARE: f64 = 0.3;
 
-/// Share of what a neighbour has that a cell has at least.
+/// Minimum of a cell as a share of its neighbour.
 const NEIGHBOUR_SHARE: f64 = 0.1;
 
-/// Share of the mean that a cell has at least: a corner of the body may lie between the points.
+/// Minimum of a cell as a share of the mean: a corner of the body may be between the points.
 const LEAST_SHARE: f64 = 1e-3;
 
-/// The irradiated part of the box in cells.
+/// Cells of the irradiated part of the box.
 #[derive(Debug)]
 pub(crate) struct CollisionMap {
     /// Cumulative sampling density of the cells.
     sums: Vec<f64>,
     field: Field,
-    /// Mean mass on the way in and out.
+    /// Mean mass on the path in and out.
     pub mass: Vec<[f32; LANES]>,
-    /// Mean energy of the photons that get through that mass, keV.
+    /// Mean energy of the photons that pass that mass, keV.
     pub typical_kev: f64,
-    /// The cells as single collisions, with the photons that can be expected to scatter in each.
+    /// The cells as single collisions, with the expected number of photons that scatter in each.
     pub cells: Vec<Site>,
 }
 
-/// A drawn collision.
+/// A sampled collision.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Collision {
-    /// Where the photon leaves the focal spot.
+    /// Point of the focal spot from which the photon starts.
     pub spot: Point3<f64>,
-    /// Where the ray meets the detector plane.
+    /// Intersection of the ray with the detector plane.
     pub aim: Point2<f64>,
     pub direction: Vector3<f64>,
     pub position: Point3<f64>,
     /// Inverse of its probability per mm² of the detector plane and mm of the ray.
     pub mm3: f64,
-    /// The cell it lies in; neighbours mostly have neighbouring numbers.
+    /// The cell of the collision; neighbours mostly have neighbouring numbers.
     pub cell: usize,
 }
 
@@ -83,7 +83,7 @@ impl CollisionMap {
             }
             weight += sample.site.weight;
         }
-        // The way out is taken to be as long as the way in.
+        // The path out is assumed to be as long as the path in.
         let twice = 2.0 / weight.max(f32::MIN_POSITIVE);
         for mean in map.mass.iter_mut().flatten() {
             *mean *= twice;
@@ -93,7 +93,7 @@ impl CollisionMap {
         map
     }
 
-    /// Sets the sampling density of the cells from their `importance`, with a share by scattered energy for cells that it underestimates.
+    /// Sets the sampling density of the cells from their `importance`, with a share by scattered photons for cells that it underestimates.
     pub fn set_density(&mut self, importance: &[f64]) {
         let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
             (0..self.cells.len())
@@ -119,7 +119,7 @@ impl CollisionMap {
             .collect();
     }
 
-    /// What a cell holds.
+    /// Content of a cell.
     fn sample(
         &self,
         cell: usize,
@@ -210,7 +210,7 @@ impl CollisionMap {
         }
     }
 
-    /// A collision drawn as [`CollisionMap::set_density`] says; the point is uniform in the unit cube.
+    /// Samples a collision with the density of [`CollisionMap::set_density`]; the point is uniform in the unit cube.
     #[inline]
     pub fn draw(
         &self,
@@ -244,7 +244,7 @@ impl CollisionMap {
     }
 }
 
-/// Gives every cell a share of what its strongest neighbour has: between the sampled points of a cell may lie as much.
+/// Gives every cell a share of its strongest neighbour, because there may be as much between the sampled points of a cell.
 fn spread_to_neighbours(own: &[f64]) -> Vec<f64> {
     (0..own.len())
         .map(|index| {
@@ -275,7 +275,7 @@ fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
     (energy / photons).clamp(CUTOFF_KEV, MAX_ENERGY_KEV)
 }
 
-/// What a cell holds.
+/// Content of a cell.
 struct CellSample {
     site: Site,
     /// Mass between source and cell, times the weight.

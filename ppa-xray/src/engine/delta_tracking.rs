@@ -8,18 +8,18 @@ use ppa_core::random::Philox;
 use crate::transport::attenuation::{Coefficients, EnergyNode};
 use crate::transport::tracking::Transport;
 
-/// How far beyond a wall a flight continues, so that it lies in the next block whatever rounding does.
+/// Distance that a flight continues beyond a wall, so that it ends in the next block despite rounding.
 const BEYOND_MM: f64 = 1e-7;
 
 /// The next collision of a photon.
 pub(super) struct Landing {
     pub distance_mm: f64,
     pub material: u8,
-    /// Of that material.
+    /// Coefficients of the material there.
     pub coefficients: Coefficients,
 }
 
-/// Flies from a place along a unit vector to the next collision, if there is one within `length_mm`.
+/// Flies from a point along a unit vector to the next collision, if there is one within `length_mm`.
 pub(super) fn fly(
     transport: &Transport,
     from: &Point3<f64>,
@@ -48,7 +48,7 @@ pub(super) fn fly(
         let region = majorants.region(block[0] + nx * (block[1] + ny * block[2]));
         let bound = f64::from(majorants.bound(row, region));
         let reach = u32::from(region.reach);
-        // Where the photon leaves the region.
+        // Distance at which the photon leaves the region.
         let mut wall_mm = f64::INFINITY;
         for axis in 0..3 {
             let face = if ray.slope[axis] > 0.0 {
@@ -85,8 +85,8 @@ pub(super) fn fly(
     None
 }
 
-/// Of mean 1.
+/// Samples an optical depth of mean 1.
 fn optical_depth(rng: &mut Philox) -> f64 {
-    // 1 − u lies in (0, 1], so the logarithm stays finite.
+    // 1 − u is in (0, 1], so the logarithm stays finite.
     -(1.0 - rng.unit()).ln()
 }

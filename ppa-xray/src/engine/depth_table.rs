@@ -11,16 +11,16 @@ use crate::engine::paths::Paths;
 pub(super) const RAYS: usize = 32;
 pub(super) const DEPTHS: usize = 64;
 
-/// Rays in even steps of stereographic coordinates, which have no pole on this side of the detector plane.
+/// Rays at equal steps of stereographic coordinates, which have no pole on this side of the detector plane.
 #[derive(Debug)]
 pub(super) struct DepthTable {
     pub low: [f32; 2],
     /// Rays per unit of the coordinates.
     pub per_unit: [f32; 2],
-    /// Distance from the point of the first depth.
+    /// Distance of the first depth from the point.
     pub near_mm: f32,
     pub depths_per_mm: f32,
-    /// Ray by ray.
+    /// Optical depths, ray by ray.
     pub depths: Vec<f32>,
 }
 
@@ -37,7 +37,7 @@ impl Default for DepthTable {
 }
 
 impl DepthTable {
-    /// Depths from `target` to places in the box with these `corners`, whose coarse cells have attenuations `mu_per_mm`.
+    /// Tabulates depths from `target` to points in the box with these `corners`, whose coarse cells have attenuations `mu_per_mm`.
     pub fn tabulate(
         &mut self,
         paths: &Paths,
@@ -90,7 +90,7 @@ impl DepthTable {
     }
 }
 
-/// Coordinates of a direction towards −z.
+/// Stereographic coordinates of a direction towards −z.
 fn stereographic(direction: &Vector3<f64>) -> [f64; 2] {
     let scale = 1.0 / (direction.norm() - direction.z);
     [direction.x * scale, direction.y * scale]

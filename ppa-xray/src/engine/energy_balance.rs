@@ -1,4 +1,4 @@
-//! Test: no history creates or loses energy.
+//! Test that no history creates or loses energy.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_core::random::Philox;
@@ -16,10 +16,10 @@ use crate::transport::score::{Arrival, Score};
 
 const MATERIALS: [&str; 5] = ["air", "water", "bone_cortical", "titanium", "lead"];
 
-/// Keeps the books of the history in every slot.
+/// Energy balance of the history in every slot.
 #[derive(Default)]
 struct Balance {
-    /// Emitted energy and what of it has been accounted for, keV.
+    /// Emitted energy and the part of it that has been accounted for, keV.
     slots: Vec<Option<(f64, f64)>>,
     finished: u64,
     worst: f64,
@@ -69,14 +69,14 @@ proptest! {
         size in [1..14_usize, 1..14, 1..20],
         voxels in prop::collection::vec((0..MATERIALS.len() as u8, 0.0..3.0_f32), 40),
         spacing_mm in 0.5..12.0_f64,
-        // Compton scattering brings the softest below the cutoff.
+        // Compton scattering takes the softest photons below the cutoff.
         low_kev in prop_oneof![Just(5.02), 5.0..100.0_f64],
         width_kev in prop_oneof![Just(0.0), 0.0..50.0_f64],
         seed in any::<u64>(),
         impulse in any::<bool>(),
     ) {
         let grid = Grid::axis_aligned(size, Vector3::repeat(spacing_mm), Point3::origin()).unwrap();
-        // No period of the lattice.
+        // Not periodic in the lattice.
         let (material, density) = (0..grid.len())
             .map(|n| voxels[n.wrapping_mul(2_654_435_761) % 2_147_483_647 % voxels.len()])
             .unzip();

@@ -7,13 +7,13 @@ use crate::engine::prepared_phantom::PreparedPhantom;
 use crate::transport::tracking::{Transport, TransportError};
 
 impl PreparedPhantom<'_> {
-    /// Incident air kerma (without backscatter) where the central ray enters the patient, Gy per history: that of
-    /// [`Dose::entrance_air_kerma_gy_per_history`](crate::Dose). Times [`Radiograph::histories`](crate::Radiograph) it is that of the exposure.
+    /// Incident air kerma (without backscatter) where the central ray enters the patient, Gy per history; equal to
+    /// [`Dose::entrance_air_kerma_gy_per_history`](crate::Dose). Multiply by [`Radiograph::histories`](crate::Radiograph) for the exposure.
     ///
-    /// `None` where the central ray meets nothing of more than 0.3 g/cm³, or is blocked by the collimator.
+    /// `None` if the central ray meets nothing denser than 0.3 g/cm³, or is blocked by the collimator.
     ///
     /// # Errors
-    /// [`TransportError`] when the geometry or the spectrum makes no sense.
+    /// [`TransportError`] if the geometry or the spectrum is invalid.
     pub fn entrance_air_kerma_gy_per_history(
         &self,
         spectrum: &Spectrum,

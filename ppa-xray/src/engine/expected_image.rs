@@ -1,7 +1,7 @@
 //! The expected image of one source, and of focal and extrafocal radiation together.
 //!
-//! The signals of both are additive, and so are their images: each is computed separately, per history of its own, and weighted by its share of the
-//! histories. docs/physics.md, "Extrafocal radiation".
+//! The signals of both are additive, and so are their images: each is computed separately, per own history, and weighted by its share of
+//! the histories. docs/physics.md, "Extrafocal radiation".
 
 use ppa_core::random::Philox;
 
@@ -30,28 +30,28 @@ use crate::transport::stream::Stream;
 use crate::transport::tally::{Moments, mix};
 use crate::transport::tracking::TransportError;
 
-/// How much farther apart than for single scatter the points for multiple scatter are.
+/// Spacing of the points for multiple scatter relative to that for single scatter.
 const MULTIPLE_SPACING: f64 = 1.4;
 
-/// First collisions on a list for each that a point of the detector in the dark samples.
+/// First collisions on a list per collision that a point of the detector in the dark samples.
 const LISTED_PER_CHOICE: f64 = 32.0;
 
-/// Share of the work that the focal spot takes where there is extrafocal radiation, for the report of progress.
+/// Share of the work for the focal spot if there is extrafocal radiation, for progress reports.
 const FOCAL_DONE: f64 = 0.75;
 
-/// What the pixels hold in the mean, per history.
+/// Expected content of the pixels, per history.
 pub(super) struct ExpectedImage {
     pub primary: Vec<Moments>,
     /// Compton, Rayleigh, multiple.
     pub scattered: [PixelScatter; 3],
     /// Covariance of the errors of Compton and Rayleigh scatter, keV².
     pub shared: Vec<f64>,
-    /// Largest share that a single path has in the scatter of a point of the detector.
+    /// Largest share of a single path in the scatter of a point of the detector.
     pub largest_share: f64,
 }
 
 impl ExpectedImage {
-    /// The image by focal and extrafocal photons; `open_kev` is the energy of a pixel in the open field.
+    /// Computes the image by focal and extrafocal photons; `open_kev` is the energy of a pixel in the open field.
     pub fn of_all_photons(
         exposure: &Exposure,
         tables: &FastTables,
@@ -77,7 +77,7 @@ impl ExpectedImage {
         Ok(focal.mixed_with(&beside, share))
     }
 
-    /// The image by the photons that leave the spot of an exposure's emitter, with its `primary`.
+    /// Computes the image by the photons that leave the spot of an exposure's emitter, with its `primary`.
     fn of_spot(
         exposure: &Exposure,
         tables: &FastTables,
@@ -116,7 +116,7 @@ impl ExpectedImage {
         })
     }
 
-    /// The mean of this image and another that has a `share` of the histories, with independent errors.
+    /// Mixes this image with another that has a `share` of the histories, with independent errors.
     fn mixed_with(mut self, other: &Self, share: f64) -> Self {
         let weights = [1.0 - share, share];
         let mixed = |a: f64, b: f64| weights[0] * a + weights[1] * b;
@@ -160,7 +160,7 @@ fn focal_primary(
     )
 }
 
-/// Settings for photons that are a `share` of the histories: their errors count by that share.
+/// Settings for photons that are a `share` of the histories: their errors are weighted by that share.
 fn of_share(settings: &FastSettings, share: f64) -> FastSettings {
     let mut rng = Philox::new(settings.seed, Stream::Extrafocal as u32, 0);
     let words = [(); 2].map(|()| (rng.unit() * 4_294_967_296.0) as u64);

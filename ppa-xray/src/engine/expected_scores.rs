@@ -1,4 +1,4 @@
-//! Expected scores of many collision sites at one point of the detector: the arithmetic of its importance model as vector code.
+//! Expected scores of many collision sites at one point of the detector: vectorised evaluation of its importance model.
 //!
 //! docs/physics.md, "Fast engine", single scatter.
 
@@ -10,7 +10,7 @@ use crate::engine::site::Site;
 use crate::isa::Kernel;
 use crate::vector_math::{exp, floor, greatest, least};
 
-/// Sites that are handled together.
+/// Number of sites processed together.
 const CHUNK: usize = 64;
 
 /// Every `every`-th site from `first` on.
@@ -21,7 +21,7 @@ pub(crate) struct Subset {
 }
 
 impl Subset {
-    /// How many of `sites` sites take part.
+    /// Number of sites in the subset, out of `sites`.
     pub fn count(&self, sites: usize) -> usize {
         sites.saturating_sub(self.first).div_ceil(self.every)
     }
@@ -35,7 +35,7 @@ pub(super) struct ExpectedScores<'a> {
     pub scattering: &'a [f32],
     pub sites: &'a [Site],
     pub subset: Subset,
-    /// Without and with attenuation on the way to the point, one pair for each site of the subset.
+    /// Scores without and with attenuation on the way to the point, one pair for each site of the subset.
     pub scores: &'a mut [[f32; 2]],
 }
 
@@ -57,7 +57,7 @@ impl Kernel for ExpectedScores<'_> {
             let [mut weight, mut attenuation_ratio] = [[0.0; CHUNK]; 2];
             let mut row = [0_u32; CHUNK];
             for lane in 0..CHUNK {
-                // The last chunk repeats its last site.
+                // The last chunk repeats the last site.
                 let number = chunk * CHUNK + lane.min(scores.len() - 1);
                 let site = &self.sites[first + number * every];
                 [x[lane], y[lane], z[lane]] = site.position.into();
@@ -133,7 +133,7 @@ impl Kernel for ExpectedScores<'_> {
     }
 }
 
-/// The lower of the two of `count` nodes about a place, and how far from there to the upper one it is.
+/// The lower of the two nodes next to a position, out of `count`, and the fraction of the interval above it.
 #[inline(always)]
 fn between_nodes(at: f32, count: usize) -> (u32, f32) {
     let at = least(greatest(at, 0.0), (count - 1) as f32);
@@ -195,7 +195,7 @@ mod tests {
         (0..count).map(site).collect()
     }
 
-    /// By the formula, in double precision.
+    /// The formula, in double precision.
     fn score(site: &Site, target: &Point3<f32>) -> [f64; 2] {
         let along = (target - site.position).cast::<f64>();
         let r = along.norm();

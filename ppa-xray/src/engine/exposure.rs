@@ -1,4 +1,4 @@
-//! What both engines need of one exposure: transport, response of the detector, readout.
+//! Data of one exposure that both engines need: transport, response of the detector, readout.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::phantom_tables::PhantomTables;
 use crate::transport::tracking::{Transport, TransportError};
 
-/// Transport through the phantom to the detector plane, and what the detector makes of a photon there.
+/// Transport through the phantom to the detector plane, and the response of the detector to photons.
 pub(crate) struct Exposure<'a> {
     pub transport: Transport<'a>,
     pub response: Response,
@@ -23,7 +23,7 @@ pub(crate) struct Exposure<'a> {
 
 impl<'a> Exposure<'a> {
     /// # Errors
-    /// [`TransportError`] when geometry, receptor or spectrum make no sense, or the image does not fit into memory.
+    /// [`TransportError`] if geometry, receptor or spectrum are invalid, or if the image does not fit into memory.
     pub fn new(
         phantom: &'a VoxelPhantom,
         spectrum: &'a Spectrum,
@@ -34,7 +34,7 @@ impl<'a> Exposure<'a> {
         Self::with_tables(Arc::new(tables), spectrum, projection)
     }
 
-    /// As [`Exposure::new`], with tables that are made once for several exposures.
+    /// The same as [`Exposure::new`], with tables shared by several exposures.
     pub fn with_tables(
         tables: Arc<PhantomTables<'a>>,
         spectrum: &'a Spectrum,
@@ -50,7 +50,7 @@ impl<'a> Exposure<'a> {
         })
     }
 
-    /// The same photons and response with another detector in the same plane, about the same centre.
+    /// The same photons and response with another detector in the same plane, with the same centre.
     pub fn with_projection<'b>(&'b self, projection: &'b Projection) -> Exposure<'b> {
         Exposure {
             transport: self.transport.with_projection(projection),
@@ -59,7 +59,7 @@ impl<'a> Exposure<'a> {
         }
     }
 
-    /// The same exposure by its extrafocal photons alone, and their share of the histories.
+    /// The same exposure with extrafocal photons only, and their share of the histories.
     pub fn of_extrafocal(&self) -> Option<(Self, f64)> {
         let (transport, share) = self.transport.of_extrafocal()?;
         let alone = Self {

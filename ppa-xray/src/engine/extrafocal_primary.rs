@@ -1,4 +1,4 @@
-//! Primary image of extrafocal photons: rays to pixels as wide as its blur, interpolated to those of the detector by cubics.
+//! Primary image of extrafocal photons: rays to pixels as wide as its blur, interpolated to the pixels of the detector by cubics.
 //!
 //! docs/physics.md, "Extrafocal radiation".
 
@@ -40,7 +40,7 @@ pub(super) fn extrafocal_primary(
     let share = detector.pixel_cm2() / projection.detector.pixel_cm2();
     let values = |of: fn(&Moments) -> f64| {
         let coarse: Vec<f64> = moments.iter().map(|moments| share * of(moments)).collect();
-        // Beside the dark the cubics may swing below 0.
+        // Next to dark regions the cubics may become negative.
         let values = to_pixels.values(&coarse).into_iter();
         values.map(|value| value.max(0.0)).collect::<Vec<_>>()
     };
@@ -66,7 +66,7 @@ fn blur_mm(transport: &Transport) -> f64 {
     2.0 * transport.emitter.spot().reach_mm() * (magnification - 1.0).max(0.0)
 }
 
-/// Whole numbers of pixels together, at most `side_mm` wide, about the same centre and at least one more on every side.
+/// Groups of pixels, at most `side_mm` wide, around the same centre, with at least one more on every side.
 fn wider_pixels(detector: &Detector, side_mm: f64) -> Detector {
     let least = detector.columns.min(detector.rows);
     let binning = ((side_mm / detector.pixel_mm) as u32).clamp(1, least);
@@ -82,7 +82,7 @@ fn wider_pixels(detector: &Detector, side_mm: f64) -> Detector {
 mod tests {
     use super::*;
 
-    /// The centres of the outer pixels lie beyond the detector, whatever is left over.
+    /// The centres of the outer pixels are beyond the detector, for any remainder.
     #[test]
     fn wider_pixels_surround_the_detector() {
         for (columns, rows, side_mm) in [

@@ -21,16 +21,16 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Category;
 use crate::transport::tracking::TransportError;
 
-/// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
+/// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the cost of following them.
 ///
 /// Geometry, physics and units are those of [`crate::analog`].
 /// Primary: line integrals averaged over each pixel.
-/// Scatter, which varies slowly: forced detection at points of the detector, closer together where it is curved, and cubic interpolation to the
-/// pixels. Then every layer gets the noise of an energy-integrating detector. The standard errors
-/// hold both that noise and the error of the scatter estimate, which neighbouring pixels share.
+/// Scatter, which varies slowly: forced detection at points of the detector, which are denser where the scatter is curved, and cubic
+/// interpolation to the pixels. Every layer then gets the noise of an energy-integrating detector. The standard errors
+/// include this noise and the error of the scatter estimate, which neighbouring pixels share.
 ///
 /// # Errors
-/// [`TransportError`] when the geometry, the spectrum or a setting makes no sense.
+/// [`TransportError`] if the geometry, the spectrum or a setting is invalid.
 pub fn fast(
     phantom: &VoxelPhantom,
     spectrum: &Spectrum,
@@ -42,10 +42,10 @@ pub fn fast(
 }
 
 impl PreparedPhantom<'_> {
-    /// As [`crate::fast`], which prepares the phantom each time.
+    /// The same as [`crate::fast`], without preparing the phantom each time.
     ///
     /// # Errors
-    /// As [`crate::fast`]; also when the settings name another Compton model than the phantom was prepared for.
+    /// The same as [`crate::fast`]; also if the settings name another Compton model than the phantom was prepared for.
     pub fn fast(
         &self,
         spectrum: &Spectrum,
@@ -57,14 +57,14 @@ impl PreparedPhantom<'_> {
         expose(self, spectrum, projection, settings, &unobserved)
     }
 
-    /// As [`PreparedPhantom::fast`]; `observe` receives the share of the work that is done, at each percent and about every 100 ms in between,
-    /// from any thread.
+    /// The same as [`PreparedPhantom::fast`], with progress reports: `observe` receives the completed share of the work at each percent and
+    /// about every 100 ms in between, from any thread.
     ///
-    /// The radiograph is the same, bit for bit, as without an observer. Once `observe` returns [`ControlFlow::Break`], each thread finishes the row,
-    /// node or histories (at most 8192) that it is working on.
+    /// The radiograph is bit-identical to one without an observer. Once `observe` returns [`ControlFlow::Break`], each thread finishes its
+    /// current row, node or histories (at most 8192).
     ///
     /// # Errors
-    /// As [`PreparedPhantom::fast`]; [`TransportError::Cancelled`] after [`ControlFlow::Break`].
+    /// The same as [`PreparedPhantom::fast`]; [`TransportError::Cancelled`] after [`ControlFlow::Break`].
     pub fn fast_with_progress(
         &self,
         spectrum: &Spectrum,
@@ -76,13 +76,14 @@ impl PreparedPhantom<'_> {
         expose(self, spectrum, projection, settings, observe)
     }
 
-    /// The same exposure on 96 to 191 pixels along the shorter side, or as many as the image has if they are fewer, with fewer rays and a thirty-second of the histories for the scatter.
+    /// The same exposure on 96 to 191 pixels along the shorter side, or as many as the image has if they are fewer, with fewer rays and a
+    /// thirty-second of the histories for the scatter.
     ///
-    /// It takes less than a tenth of the time of [`PreparedPhantom::fast`], to be shown before that. Values and standard errors
-    /// hold for its own, larger pixels; its detector begins in the same corner at low x and y.
+    /// It takes less than a tenth of the time of [`PreparedPhantom::fast`] and can be shown before it. Values and standard
+    /// errors apply to its own, larger pixels. Its detector begins in the same corner at low x and y.
     ///
     /// # Errors
-    /// As [`PreparedPhantom::fast_with_progress`].
+    /// The same as [`PreparedPhantom::fast_with_progress`].
     pub fn preview(
         &self,
         spectrum: &Spectrum,
@@ -188,7 +189,7 @@ mod tests {
         }
     }
 
-    /// Prepared once for two exposures and for each, observed or not: the same bytes.
+    /// Results do not depend on sharing a prepared phantom between two exposures, nor on an observer.
     #[test]
     fn preparation_and_observers_change_no_byte() {
         let (phantom, spectrum, projection) = small_limb::exposure();
@@ -214,7 +215,7 @@ mod tests {
         assert!(first > 0.0 && (last - 1.0).abs() < 1e-9, "{shares:?}");
     }
 
-    /// Rows whose first pixels lie in the shadow of the collimator count as well.
+    /// Rows whose first pixels are in the shadow of the collimator are counted as well.
     #[test]
     fn a_collimated_primary_can_be_cancelled() {
         let (phantom, spectrum, mut projection) = small_limb::exposure();

@@ -6,22 +6,22 @@ use std::time::Instant;
 
 use crate::transport::tracking::TransportError;
 
-/// Shares of the work after which the primary and single scatter are done, for the report of progress.
+/// Completed shares of the work after the primary and after single scatter, for progress reports.
 pub(super) const PRIMARY_DONE: f64 = 0.2;
 pub(super) const SINGLE_DONE: f64 = 0.6;
 
-/// Longest time between two reports while units are completed: an observer that cancels waits no longer.
+/// Longest time between two reports while units are completed, and so the longest wait of an observer that cancels.
 const REPORT_EVERY_MS: u64 = 100;
 
-/// Receives the share of the work that is done, 0 to 1, and cancels the rest with [`ControlFlow::Break`].
+/// Receives the completed share of the work, 0 to 1, and cancels the rest with [`ControlFlow::Break`].
 pub(crate) type Observer<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
 
-/// Passes progress on to an observer, and its wish to cancel back to the work.
+/// Reports progress to an observer, and passes its cancellation to the work.
 pub(crate) struct Monitor<'a> {
     observe: Observer<'a>,
     cancelled: AtomicBool,
     begun: Instant,
-    /// When the last report was made, since the beginning.
+    /// Time of the last report, since the beginning.
     reported_ms: AtomicU64,
 }
 
@@ -35,13 +35,13 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// A monitor that nobody observes.
+    /// A monitor without an observer.
     #[cfg(test)]
     pub fn silent() -> Self {
         Self::new(&|_| ControlFlow::Continue(()))
     }
 
-    /// The stretch of the work between two shares of it, in `units` of about equal cost.
+    /// The phase of the work between two shares, in `units` of about equal cost.
     pub fn phase(&self, shares: Range<f64>, units: usize) -> Phase<'_> {
         Phase {
             monitor: self,
@@ -51,7 +51,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// Whether the last report was made too long ago; true for one thread only, which then reports.
+    /// Whether a report is due; true for one thread only, which then reports.
     fn is_due(&self) -> bool {
         let now = self.begun.elapsed().as_millis() as u64;
         let last = self.reported_ms.load(Ordering::Relaxed);
@@ -63,7 +63,7 @@ impl<'a> Monitor<'a> {
     }
 
     /// # Errors
-    /// [`TransportError::Cancelled`] once the observer has said so.
+    /// [`TransportError::Cancelled`] once the observer has cancelled.
     pub fn check(&self) -> Result<(), TransportError> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(TransportError::Cancelled);
@@ -72,7 +72,7 @@ impl<'a> Monitor<'a> {
     }
 }
 
-/// A stretch of the work.
+/// A phase of the work.
 pub(crate) struct Phase<'a> {
     monitor: &'a Monitor<'a>,
     shares: Range<f64>,
@@ -81,7 +81,7 @@ pub(crate) struct Phase<'a> {
 }
 
 impl Phase<'_> {
-    /// Counts one more unit, and reports each whole percent of the work, or after a while without a report.
+    /// Counts one more unit. Reports each percent of the work, and also after some time without a report.
     pub fn advance(&self) {
         let before = self.done.fetch_add(1, Ordering::Relaxed) as f64;
         let [before, after] = [before, before + 1.0].map(|done| {
@@ -98,7 +98,7 @@ impl Phase<'_> {
         }
     }
 
-    /// Whether the rest of the work may be left out, because nobody will see its result.
+    /// Whether the rest of the work may be skipped because its result will not be used.
     pub fn is_cancelled(&self) -> bool {
         self.monitor.cancelled.load(Ordering::Relaxed)
     }
@@ -111,7 +111,7 @@ mod tests {
 
     use super::*;
 
-    /// A percent of a long exposure takes minutes.
+    /// One percent of a long exposure takes minutes.
     #[test]
     fn an_observer_can_cancel_within_a_percent() {
         let reports = AtomicU64::new(0);

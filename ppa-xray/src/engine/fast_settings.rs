@@ -8,7 +8,7 @@ use crate::matter::compton::ComptonModel;
 use crate::setters::setters;
 use crate::transport::tracking::TransportError;
 
-/// What the fast engine spends, and the exposure its image stands for.
+/// Effort of the fast engine, and the exposure that its image represents.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
@@ -52,19 +52,19 @@ setters!(FastSettings {
 });
 
 impl FastSettings {
-    /// Most histories that the noise of an image may stand for, if not infinitely many: a tube load of 3e7 mAs.
+    /// Upper limit of a finite `dose_histories`: a tube load of 3e7 mAs.
     const MOST_DOSE: f64 = 1e18;
 
-    /// Most histories for the scatter: their first collisions take about 5 GB.
+    /// Upper limit of the histories for scatter: their first collisions take about 5 GB.
     const MOST_SCATTER: u64 = 100_000_000;
 
-    /// Most points for scatter before any are set closer; a point and those around it take about 2 kB.
+    /// Upper limit of the number of scatter points before refinement; a point and those around it take about 2 kB.
     const MOST_NODES: f64 = 1e5;
 
-    /// Checks the settings for an image on a detector.
+    /// Checks the settings for an image on `detector`.
     ///
     /// # Errors
-    /// [`TransportError::Setting`] naming the number at fault.
+    /// [`TransportError::Setting`] naming the invalid number.
     pub fn check(&self, detector: &Detector) -> Result<(), TransportError> {
         let [width, height] = detector.field().size_mm();
         let along = |size_mm: f64| (size_mm / self.scatter_pixel_mm).ceil() + 1.0;

@@ -1,4 +1,4 @@
-//! Lists of first collisions: places by importance sampling, forced (expected) attenuation to each, all energies at once.
+//! Lists of first collisions: positions by importance sampling, forced (expected) attenuation to each, all energies at once.
 //!
 //! Estimator: the integral over the body of fluence times scattering coefficient, docs/physics.md, "Fast engine", first collisions.
 
@@ -21,15 +21,15 @@ use crate::vector_math::{exp, pad};
 /// Independent lists, whose spread gives the standard error.
 pub(crate) const ESTIMATES: usize = 16;
 
-/// Share of the histories that continue from all sites alike.
+/// Share of the histories that are distributed equally over all sites.
 const ALIKE: f64 = 0.5;
 
-/// First collisions, evenly spread over the irradiated body: for single scatter each point of the detector chooses from
-/// them, histories of multiple scatter continue from them.
+/// First collisions distributed over the irradiated body. For single scatter each point of the detector selects from
+/// them; histories of multiple scatter continue from them.
 #[derive(Default)]
 pub(crate) struct FirstCollisions {
     pub sites: Vec<Site>,
-    /// Photons of every line that get to a site, times the mass that it stands for, site by site, padded as the lines are. Their sum
+    /// Photons of every line that reach a site, times the mass that it represents, site by site, padded like the lines. Their sum
     /// over a list is an integral over all sites: mm g/cm³ per history.
     photons: Vec<f32>,
     /// Photons that scatter at the sites or are absorbed and followed by a K x-ray, and the cumulative number of histories that start
@@ -38,10 +38,10 @@ pub(crate) struct FirstCollisions {
     cdf: Vec<f64>,
 }
 
-/// Collisions after which a list looks whether it shall go on.
+/// Number of collisions between checks for cancellation.
 const CANCEL_EVERY: usize = 1024;
 
-/// What is needed to draw first collisions.
+/// Data needed to sample first collisions.
 pub(crate) struct FirstFlights<'a> {
     pub transport: &'a Transport<'a>,
     pub paths: &'a Paths<'a>,
@@ -51,7 +51,7 @@ pub(crate) struct FirstFlights<'a> {
 }
 
 impl FirstFlights<'_> {
-    /// [`ESTIMATES`] lists of `collisions` each; shorter ones once the monitor is cancelled.
+    /// Samples [`ESTIMATES`] lists of `collisions` each; shorter ones once the monitor is cancelled.
     pub fn lists(&self, seed: u64, collisions: u64, monitor: &Monitor) -> Vec<FirstCollisions> {
         let phase = monitor.phase(PRIMARY_DONE..PRIMARY_DONE, 1);
         (0..ESTIMATES as u64)
@@ -77,7 +77,7 @@ impl FirstFlights<'_> {
             self.map
                 .draw(points.next(), self.transport, self.paths, rng)
         }));
-        // Neighbours beside each other: even steps through the list are then even in space too.
+        // Sorted so that neighbours are adjacent: equal steps through the list are then also evenly distributed in space.
         drawn.sort_by_key(|collision| collision.cell);
         let mut list = FirstCollisions::default();
         let mut mass = vec![[0.0; LANES]; self.paths.basis.groups];
@@ -94,7 +94,7 @@ impl FirstFlights<'_> {
         list
     }
 
-    /// Puts a collision on a list.
+    /// Adds a collision to a list.
     fn enter(
         &self,
         collision: &Collision,
@@ -147,7 +147,7 @@ impl FirstFlights<'_> {
 }
 
 impl FirstCollisions {
-    /// Every line, with how many of its photons get to a site.
+    /// Every line, with the number of its photons that reach a site.
     #[inline]
     pub fn photons<'a>(
         &'a self,
@@ -159,14 +159,14 @@ impl FirstCollisions {
         lines.zip(photons.map(|&photons| f64::from(photons)))
     }
 
-    /// How many photons of every line get to a site, padded.
+    /// Number of photons of every line that reach a site, padded.
     #[inline]
     pub fn padded_photons(&self, site: usize, lines: &Lines) -> &[f32] {
         &self.photons[site * lines.padded()..][..lines.padded()]
     }
 
-    /// Many histories continue from where scatter matters, which is where the sites are, the others by the photons that
-    /// continue, so that no weight grows beyond bounds.
+    /// Many histories are distributed equally over the sites, which are dense where scatter matters; the others follow the photons that
+    /// continue, so that the weights are bounded.
     fn share_out(&mut self) {
         let whole: f64 = self.secondary.iter().sum();
         let mut sum = 0.0;
@@ -181,7 +181,7 @@ impl FirstCollisions {
             .collect();
     }
 
-    /// The history at `share` of the way through all that continue: its site, energy, and photons that it stands for if it
+    /// The history at `share` of all that continue: its site, energy, and the photons that it would represent if it
     /// were the only one.
     pub fn continuing(&self, share: f64, lines: &Lines) -> (&Site, f64, f64) {
         let target = share * self.cdf[self.cdf.len() - 1];

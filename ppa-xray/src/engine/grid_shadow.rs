@@ -1,8 +1,8 @@
 //! Lines of a stationary grid in the expected primary.
 //!
-//! The primary of a pixel, a mean over the phase of the strips, is multiplied by the transmission of the strips over its aperture relative to that mean, weighted with the
-//! spectrum behind the phantom at its centre. Within the pixel the fluence in front of the grid is taken as uniform, and extrafocal photons, whose
-//! shadows of the strips are displaced by up to 0.04 mm, are given the lines of those of the focal spot.
+//! The primary of a pixel, a mean over the phase of the strips, is multiplied by the transmission of the strips over its aperture relative
+//! to that mean, weighted with the spectrum behind the phantom at its centre. Within the pixel the fluence in front of the grid is taken as
+//! uniform. Extrafocal photons, whose strip shadows are displaced by up to 0.04 mm, get the lines of the focal spot.
 //!
 //! docs/physics.md, "Detector", grid.
 
@@ -28,19 +28,20 @@ use crate::vector_math::{WIDTH, exp, pad};
 /// Points per side of the focal spot over which fluence and response of the detector are averaged.
 const OPEN_POINTS: usize = 2;
 
-/// Harmonics of more cycles per pixel are left out: the aperture leaves less than 2 % of them.
+/// Harmonics with more cycles per pixel are omitted: the aperture leaves less than 2 % of them.
 const MOST_CYCLES: f64 = 16.0;
 
 /// Primary of all pixels behind the strips.
 pub(super) struct ShadowedPrimary {
-    /// Primary that the blur of the pixels turns into the expected signal. The blur multiplies a harmonic above the Nyquist frequency by the transfer
-    /// at its alias; to compensate, such a harmonic is scaled here by the transfer at its own frequency divided by that at the alias.
+    /// Primary that the blur of the pixels converts to the expected signal. The blur multiplies a harmonic above the Nyquist frequency by
+    /// the transfer at its alias; to compensate, the harmonic is scaled here by the transfer at its own frequency divided by that at
+    /// the alias.
     pub expected: Vec<Moments>,
     /// Primary that reaches the pixels, if it differs.
     pub counted: Option<Vec<Moments>>,
 }
 
-/// Puts the lines of a stationary grid into the primary; without such a grid it stays as it is.
+/// Applies the lines of a stationary grid to the primary; without such a grid it is unchanged.
 pub(super) fn shadowed(
     exposure: &Exposure,
     tables: &PathTables,
@@ -116,10 +117,10 @@ struct ShadowTable {
     places: Vec<ShadowsAtPlace>,
 }
 
-/// For the shortest and the longest way through the grid, between which the share is interpolated: it varies by some per cent along the strips.
+/// Values for the shortest and the longest path through the grid, interpolated in between: they vary by some per cent along the strips.
 struct ShadowsAtPlace {
     ways_mm: [f64; 2],
-    /// By way, then [`EXPECTED`] and [`COUNTED`], line by line, padded.
+    /// By path, then [`EXPECTED`] and [`COUNTED`], line by line, padded.
     shares: [[Vec<f32>; 2]; 2],
 }
 
@@ -178,7 +179,8 @@ impl ShadowTable {
         }
     }
 
-    /// Factors of the mean energy and the mean squared energy, for the [`EXPECTED`] and the [`COUNTED`] primary; `through` is what the phantom transmits of a chunk of lines.
+    /// Factors of the mean energy and mean squared energy, for the [`EXPECTED`] and the [`COUNTED`] primary; `through` is the transmission
+    /// of the phantom for a chunk of lines.
     fn shares(
         &self,
         place: usize,
@@ -220,14 +222,14 @@ impl ShadowTable {
     }
 }
 
-/// The aperture of a pixel on the pattern.
+/// The aperture of a pixel on the strip pattern.
 struct Pixel {
     at_mm: f64,
     side_mm: f64,
 }
 
 impl Pixel {
-    /// The pattern over the pixel relative to its mean, which a blur of the pixels turns into that of the converter.
+    /// The pattern over the pixel relative to its mean, which a blur of the pixels converts to that of the converter.
     fn before_blur(&self, pattern: &StripPattern, pitch_mm: f64, readout: &Readout) -> f64 {
         let cycles = self.side_mm / pitch_mm;
         let transfer = |f: f64| readout.transfer(f).unwrap_or(1.0);
@@ -238,7 +240,7 @@ impl Pixel {
                 let alias = f - f.round();
                 let wave = Complex::new(0.0, TAU * f64::from(m) * self.at_mm / pitch_mm).exp();
                 let left = transfer(f);
-                // Both may vanish.
+                // Both may be zero.
                 let share = if left == 0.0 {
                     0.0
                 } else {

@@ -1,6 +1,6 @@
-//! Importance model of a detector point: the approximate expected contribution of a collision, to sample collisions by.
+//! Importance model of a detector point: the approximate expected contribution of a collision, used for sampling collisions.
 //!
-//! Approximation: one energy, optical depths interpolated from a table of rays from the point. It is used as a sampling density only, mixed
+//! Approximation: one energy, optical depths interpolated from a table of rays from the point. It is used only as a sampling density, mixed
 //! with the unattenuated contribution (defensive sampling, Hesterberg, Technometrics 37 (1995) 185), so estimates stay unbiased.
 //! docs/physics.md, "Fast engine", single scatter.
 
@@ -21,7 +21,7 @@ use crate::transport::tracking::Transport;
 /// Share of the samples drawn without regard to attenuation, which bounds the weights where the model underestimates.
 const DEFENSIVE: f64 = 0.1;
 
-/// What the importance of all points has in common.
+/// Data shared by the importance of all points.
 pub(crate) struct ImportanceModel<'a> {
     paths: &'a Paths<'a>,
     /// Attenuation of the coarse cells at the typical energy, 1/mm.
@@ -29,13 +29,13 @@ pub(crate) struct ImportanceModel<'a> {
     /// Compton and Rayleigh scattering together at the typical energy, by angle, material by material.
     scattering: Vec<f32>,
     corners: [Point3<f64>; 8],
-    /// Mean mass on the way of the photons, and its attenuation at the typical energy.
+    /// Mean mass on the path of the photons, and its attenuation at the typical energy.
     mass: Vec<[f32; LANES]>,
     typical_exponent: f32,
 }
 
 impl<'a> ImportanceModel<'a> {
-    /// The typical energy is that of photons that get through.
+    /// The typical energy is that of the transmitted photons.
     pub fn new(
         transport: &Transport,
         paths: &'a Paths<'a>,
@@ -64,7 +64,7 @@ impl<'a> ImportanceModel<'a> {
         }
     }
 
-    /// Attenuation at an energy over that at the typical energy.
+    /// Ratio of the attenuation at an energy to that at the typical energy.
     pub fn attenuation_ratio(&self, energy_kev: f64) -> f32 {
         if self.typical_exponent > 0.0 {
             self.paths.basis.exponent(&self.mass, energy_kev) / self.typical_exponent
@@ -75,12 +75,12 @@ impl<'a> ImportanceModel<'a> {
 }
 
 impl ImportanceModel<'_> {
-    /// Importance of each site for points of the detector with given tolerances: the root of the summed squares of its
+    /// Importance of each site for points of the detector with given tolerances: the square root of the summed squares of its
     /// expected contributions, each in units of the tolerance.
     ///
     /// Sampling in proportion to it minimises the sum of squared errors in those units.
     pub fn importance(&self, sites: &[Site], points: &[(Point3<f64>, f64)]) -> Vec<f64> {
-        // Fixed groups in fixed order: the sum is the same for any number of threads.
+        // Fixed groups in fixed order, so that the sum is the same for any number of threads.
         let squares: Vec<Vec<f64>> = points
             .par_chunks(16)
             .map_init(PointImportance::default, |importance, points| {
@@ -114,7 +114,7 @@ pub(crate) struct Draws {
 pub(crate) struct PointImportance {
     target: Point3<f32>,
     depths: DepthTable,
-    /// Of every site, without and with attenuation.
+    /// Scores of every site, without and with attenuation.
     scores: Vec<[f32; 2]>,
 }
 
@@ -151,7 +151,7 @@ impl PointImportance {
     }
 
     /// Samples sites in proportion to their expected contribution, `count` on average, by systematic sampling with the random
-    /// start `u`; passes on the index of each and its weight, the inverse of the expected number of times it is drawn.
+    /// start `u`. Passes on the index of each site and its weight, the inverse of the expected number of times it is drawn.
     ///
     /// Only sites `first`, `first + every` and so on take part.
     pub fn sample(

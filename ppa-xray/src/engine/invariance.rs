@@ -1,4 +1,4 @@
-//! Test: splitting, roulette, coarse cells and the distance between points do not change any expected value.
+//! Test that splitting, roulette, coarse cells and the distance between points do not change any expected value.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
@@ -28,7 +28,7 @@ use crate::transport::tally::Category;
 /// Energy of Compton, Rayleigh and multiple scatter on the detector, keV, with standard errors.
 type Sums = [(f64, f64); 3];
 
-/// Seven ways, three sums each: 18 differences beyond 5 standard errors of about 30 degrees of freedom raise a false
+/// Seven settings with three sums each: 18 differences beyond 5 standard errors of about 30 degrees of freedom raise a false
 /// alarm once in 2000. The standard errors of the differences are 0.2 to 0.9 %.
 #[test]
 fn no_expectation_depends_on_how_the_work_is_done() {
@@ -89,7 +89,7 @@ fn no_expectation_depends_on_how_the_work_is_done() {
         splitting,
         roulette,
     };
-    // Closer than usual, so that what the cubics between them leave is least. At 20, 10 and 7 mm the sums of six seeds differ by at most
+    // Closer than usual, to minimise the interpolation error of the cubics. At 20, 10 and 7 mm the sums of six seeds differ by at most
     // 0.05 ± 0.09 % (Compton), 0.23 ± 0.08 % (Rayleigh) and 0.4 ± 0.3 % (multiple).
     let (near, nearer) = (10.0, 7.0);
     let expected = sums(&exact, near, usual, 1);
@@ -134,7 +134,7 @@ fn no_expectation_depends_on_how_the_work_is_done() {
     }
 }
 
-/// A water cube of 20 cm with a column of bone, 5 cm before a detector of 30 cm, as in case a of the reference data: its
+/// A water cube of 20 cm with a column of bone, 5 cm in front of a detector of 30 cm, as in case a of the reference data; its
 /// multiple scatter falls steeply beyond the cube.
 fn cube() -> (VoxelPhantom, Projection) {
     let first = Point3::new(-95.0, -95.0, -95.0);
@@ -153,8 +153,8 @@ fn cube() -> (VoxelPhantom, Projection) {
     (phantom, projection)
 }
 
-/// Points at the usual distance against points half as far apart, which look at the same histories. That choice alone makes
-/// the ratio of the sums scatter by 0.13 % about 1.001 (six seeds): a false alarm once in 2e5. Twice as far apart as those of
+/// Points at the usual distance against points half as far apart, which use the same histories. That choice alone makes
+/// the ratio of the sums scatter by 0.13 % about 1.001 (six seeds): a false alarm once in 2e5. At twice the distance of those of
 /// single scatter, the points for multiple scatter lack 1.3 to 2.2 %.
 #[test]
 fn multiple_scatter_of_a_wide_body_needs_no_closer_points() {

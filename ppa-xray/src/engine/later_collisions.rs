@@ -1,4 +1,4 @@
-//! Histories from the first collision on, K x-rays included: splitting, survival weighting instead of absorption, and Russian
+//! Histories after the first collision, K x-rays included: splitting, survival weighting instead of absorption, and Russian
 //! roulette.
 //!
 //! Kahn and Harris, NBS Appl. Math. Ser. 12 (1951) 27; docs/physics.md, "Fast engine", multiple scatter.
@@ -21,13 +21,13 @@ use crate::transport::attenuation::Coefficients;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
 
-/// How weights are kept even. No expectation depends on it.
+/// Parameters that equalise the weights. No expectation depends on them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct VarianceReduction {
-    /// Histories that continue from a listed first collision, on average; more from strong ones, so that all of them have
+    /// Average number of histories that continue from a listed first collision; strong ones get more, so that all histories have
     /// the same weight.
     pub splitting: u32,
-    /// Share of that weight below which a photon either ends or is raised to that share.
+    /// Share of that weight below which a photon is either ended or raised to that share.
     pub roulette: f64,
 }
 
@@ -40,7 +40,7 @@ impl Default for VarianceReduction {
     }
 }
 
-/// What the histories share.
+/// Data shared by the histories.
 pub(crate) struct Histories<'a> {
     pub transport: &'a Transport<'a>,
     pub paths: &'a Paths<'a>,
@@ -50,20 +50,20 @@ pub(crate) struct Histories<'a> {
     pub variance_reduction: VarianceReduction,
 }
 
-/// Second and later collisions of the histories from a list. The weight of a site is the weight of its photon over the attenuation
-/// of the material, so that times a scattering coefficient it is what scatters.
+/// Second and later collisions of the histories from a list. The weight of a site is the weight of its photon divided by the attenuation
+/// of the material, so that multiplication by a scattering coefficient gives the scattered weight.
 #[derive(Default)]
 pub(crate) struct LaterCollisions {
     pub sites: Vec<Site>,
     pub events: Vec<Event>,
 }
 
-/// What happens at a collision, with energies in keV.
+/// Outcome of a collision, with energies in keV.
 #[derive(Clone, Copy)]
 pub(crate) enum Event {
     /// The photon may scatter, or be absorbed and followed by a K x-ray.
     Any { energy_kev: f32 },
-    /// It was absorbed, and a K x-ray leaves: what else a first collision sends out is single scatter.
+    /// The photon was absorbed and a K x-ray leaves; other photons that leave a first collision are single scatter.
     KRay { absorbed_kev: f32, line_kev: f32 },
 }
 
@@ -76,13 +76,13 @@ struct Photon {
 }
 
 impl Histories<'_> {
-    /// Histories that continue from every list.
+    /// Number of histories that continue from every list.
     pub fn each(&self) -> u64 {
         let listed = self.lists.iter().map(|list| list.sites.len()).max();
         (listed.unwrap_or(0) as u64) * u64::from(self.variance_reduction.splitting)
     }
 
-    /// Collisions of some of the `each` histories from a list.
+    /// Follows some of the `each` histories from a list and returns their collisions.
     pub fn collisions(
         &self,
         seed: u64,
@@ -113,8 +113,8 @@ impl Histories<'_> {
         collisions
     }
 
-    /// A photon that collides here for the first time continues. Later collisions happen or not; no photon is absorbed, but loses the weight
-    /// that is, and light photons play roulette.
+    /// Follows a photon from its first collision here. Later collisions may or may not happen. No photon is absorbed; instead it loses the
+    /// absorbed weight, and light photons play roulette.
     fn history(
         &self,
         mut photon: Photon,
@@ -164,7 +164,7 @@ impl Histories<'_> {
         }
     }
 
-    /// Where the photon is, for the importance model, which takes photons of `outgoing_kev` to leave.
+    /// Position of the photon for the importance model, which assumes outgoing photons of `outgoing_kev`.
     fn site(&self, photon: &Photon, material: u8, weight: f64, outgoing_kev: f64) -> Site {
         Site {
             position: photon.position.cast(),
@@ -175,7 +175,7 @@ impl Histories<'_> {
         }
     }
 
-    /// Flies to the next collision, if there is one this side of the detector plane.
+    /// Flies to the next collision, if there is one on this side of the detector plane.
     fn fly(&self, photon: &Photon, rng: &mut Philox) -> Option<Landing> {
         let Photon {
             position,
@@ -200,7 +200,7 @@ impl Histories<'_> {
     }
 }
 
-/// Scatters the photon, or puts a K x-ray in its place; false if too little energy is left.
+/// Scatters the photon or replaces it by a K x-ray; returns false if too little energy is left.
 fn continue_photon(
     photon: &mut Photon,
     tables: &MaterialTables,
@@ -217,13 +217,13 @@ fn continue_photon(
     } else if xi < scattering {
         tables.sample_rayleigh(photon.energy_kev, rng)
     } else {
-        // Every absorption with that much of the coefficient left emits.
+        // The remaining part of the coefficient consists of absorptions that emit.
         let per_absorption = (xi - scattering) / f64::from(c.photoelectric);
         if let Some(line_kev) = tables.k_fluorescence(photon.energy_kev, per_absorption) {
             photon.energy_kev = line_kev;
             2.0 * rng.unit() - 1.0
         } else {
-            // Rounding at the upper end, or no K x-rays at all.
+            // Rounding at the upper end, or no K x-rays.
             tables.sample_rayleigh(photon.energy_kev, rng)
         }
     };

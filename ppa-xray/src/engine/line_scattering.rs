@@ -1,4 +1,4 @@
-//! Differential scattering of one material at all lines, side by side for vector code.
+//! Differential scattering of one material at all lines, stored contiguously for vector code.
 
 use crate::engine::scatter_table::ScatterTable;
 use crate::vector_math::WIDTH;
@@ -10,7 +10,7 @@ const KINDS: usize = 3;
 #[derive(Debug)]
 pub(crate) struct LineScattering {
     values: Vec<f32>,
-    /// Lines, padded with zeros.
+    /// Number of lines, padded.
     width: usize,
 }
 
@@ -35,7 +35,7 @@ impl LineScattering {
         Self { values, width }
     }
 
-    /// Interpolates at an angle that [`ScatterTable::locate`] found.
+    /// Interpolates at an angle given by [`ScatterTable::locate`].
     pub fn at(&self, (step, fraction): (usize, f32), found: &mut LinesAtAngle) {
         let row = KINDS * self.width;
         let (low, high) = self.values[step * row..][..2 * row].split_at(row);
@@ -48,8 +48,8 @@ impl LineScattering {
 }
 
 impl LinesAtAngle {
-    /// Compton scattering and Rayleigh scattering of a gram, mm⁻¹ per g/cm³ and sr, and the mean energy that Compton
-    /// scattering leaves, keV.
+    /// Compton scattering and Rayleigh scattering of a gram, mm⁻¹ per g/cm³ and sr, and the mean energy after Compton
+    /// scattering, keV.
     pub fn parts(&self) -> [&[f32]; KINDS] {
         let width = self.values.len() / KINDS;
         std::array::from_fn(|kind| &self.values[kind * width..][..width])

@@ -1,4 +1,4 @@
-//! Energies of the quadrature over the spectrum, with attenuation and scattering of every material at each.
+//! Energies of the quadrature over the spectrum, with the attenuation and scattering of every material.
 //!
 //! docs/physics.md, "Fast engine", first collisions and single scatter.
 
@@ -34,12 +34,12 @@ pub(crate) struct Line {
     pub attenuation: Vec<[f32; LANES]>,
     /// Compton and Rayleigh scattering in all directions by material, mm⁻¹ per g/cm³.
     pub scattered: Vec<f64>,
-    /// The same with the emission of K x-rays.
+    /// The same including the emission of K x-rays.
     pub secondary: Vec<f64>,
 }
 
 impl Lines {
-    /// The energies that `accuracy` asks for.
+    /// Selects the energies for the given `accuracy`.
     pub fn new(
         exposure: &Exposure,
         paths: &Paths,
@@ -92,7 +92,7 @@ impl Lines {
         }
     }
 
-    /// Ascending.
+    /// Energies of the lines, ascending.
     pub fn energies_kev(&self) -> &[f64] {
         &self.spectra.energy_kev
     }
@@ -108,7 +108,7 @@ impl Lines {
         &self.attenuation
     }
 
-    /// Lines with padding.
+    /// Number of lines with padding.
     pub fn padded(&self) -> usize {
         self.lines.len().next_multiple_of(WIDTH)
     }
@@ -123,15 +123,15 @@ impl Lines {
         self.lines.iter().zip(self.spectra.mixed(mixture))
     }
 
-    /// Every line with its photons in the middle of the field, more or less.
+    /// Every line with its photons near the middle of the field.
     pub fn central_spectrum(&self) -> impl Iterator<Item = (&Line, f64)> {
         let middle = &self.spectra.weights[self.spectra.weights.len() / 2];
         self.lines.iter().zip(middle.iter().copied())
     }
 }
 
-/// Coefficient of what sends on a photon: Compton scattering, Rayleigh scattering, and absorption followed by a K x-ray; mm⁻¹ per
-/// g/cm³.
+/// Coefficient of interactions after which a photon continues: Compton scattering, Rayleigh scattering, and absorption followed by a
+/// K x-ray; mm⁻¹ per g/cm³.
 #[inline]
 pub(crate) fn secondary(tables: &MaterialTables, energy_kev: f64, c: &Coefficients) -> f64 {
     let emitted: f64 = tables.k_lines(energy_kev).map(|(_, share)| share).sum();

@@ -5,7 +5,7 @@ use crate::beam::marker::SideMarker;
 use crate::engine::scatter_field::PixelScatter;
 use crate::transport::tally::Moments;
 
-/// Takes what falls on the letter from all layers. Within a pixel the light is taken as even.
+/// Removes the part covered by the letter from all layers. Within a pixel the signal is taken as uniform.
 ///
 /// `shared` is the covariance of the errors of Compton and Rayleigh, keV².
 pub(super) fn shade(

@@ -1,4 +1,4 @@
-//! From an exposure to a radiograph: the analog engine, and the fast engine.
+//! The analog engine and the fast engine, which convert an exposure to a radiograph.
 //!
 //! Fast engine, in the order of its work (docs/physics.md, "Fast engine"): ray-traced primary ([`adaptive_primary`]); first
 //! collisions by importance sampling ([`collision_map`], [`first_collisions`]); single scatter by next-event estimation

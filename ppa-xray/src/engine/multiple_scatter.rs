@@ -1,4 +1,4 @@
-//! Photons scattered twice or more, and K x-rays: next-event estimation from the collisions of [`later_collisions`](super::later_collisions).
+//! Photons scattered twice or more, and K x-rays: next-event estimation from [`later_collisions`](super::later_collisions).
 //!
 //! Kalos, Nucl. Sci. Eng. 16 (1963) 111; docs/physics.md, "Fast engine", multiple scatter.
 
@@ -20,14 +20,14 @@ use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 use crate::vector_math::exp;
 
-/// Most histories from a list whose collisions are kept at the same time.
+/// Largest number of histories per list whose collisions are stored at the same time.
 const ROUND: u64 = 8_192;
 
-/// Histories for each collision that a node samples.
+/// Number of histories per collision that a node samples.
 const HISTORIES_PER_SAMPLE: f64 = 16.0;
 
-/// One sample in this many is repeated through the voxels themselves; the difference, times this number, corrects what
-/// the coarse cells get wrong on average.
+/// One sample in this many is repeated through the voxels themselves; the difference, times this number, corrects the
+/// average error of the coarse cells.
 const CORRECTION_INTERVAL: u32 = 8;
 
 /// Solid angle of all directions, sr.
@@ -41,15 +41,15 @@ pub(crate) struct MultipleScatter<'a> {
     pub nodes: NodeGrid,
 }
 
-/// Energy per cm² and history that multiple scatter leaves in the detector, at every node.
+/// Energy per cm² and history that multiple scatter deposits in the detector, at every node.
 pub(crate) struct NodeFluence {
     /// List by list.
     pub fluence: Vec<Vec<Moments>>,
-    /// Largest share of a node's sum that a single sample added.
+    /// Largest share of a single sample in a node's sum.
     pub largest_share: f64,
 }
 
-/// What a node has summed.
+/// Sums of a node.
 #[derive(Clone, Default)]
 struct NodeSum {
     /// List by list.
@@ -156,7 +156,7 @@ impl MultipleScatter<'_> {
         }
     }
 
-    /// What a photon about to collide sends to `target`, per mm².
+    /// Contribution of a photon about to collide to `target`, per mm².
     fn contribution(
         &self,
         target: &Point3<f64>,
@@ -174,7 +174,7 @@ impl MultipleScatter<'_> {
         let attenuation = &self.histories.transport.tables.attenuation;
         let tables = &self.histories.transport.tables.samplers[material];
         let incidence = self.response.incidence([target.x, target.y], &direction);
-        // Energies of photons towards the target, with what each leaves there per solid angle.
+        // Energies of photons towards the target, with the energy deposited by each per solid angle.
         let left = |energy_kev: f64, per_sr: f64| {
             (energy_kev, incidence.of_energy(energy_kev).scaled(per_sr))
         };

@@ -6,7 +6,7 @@ use nalgebra::Point2;
 
 use crate::beam::detector::Detector;
 
-/// Nodes in even steps over the whole detector, its edges included.
+/// Equally spaced nodes over the entire detector, its edges included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NodeGrid {
     pub columns: usize,
@@ -16,7 +16,7 @@ pub(crate) struct NodeGrid {
 }
 
 impl NodeGrid {
-    /// The fewest nodes whose neighbours are at most `step_mm` apart.
+    /// The grid with the fewest nodes whose neighbours are at most `step_mm` apart.
     pub fn new(detector: &Detector, step_mm: f64) -> Self {
         let field = detector.field();
         let size = field.size_mm();
@@ -29,7 +29,7 @@ impl NodeGrid {
         }
     }
 
-    /// The centres of a detector's pixels.
+    /// A grid with nodes at the pixel centres of a detector.
     pub fn of_pixels(detector: &Detector) -> Self {
         let low_mm = detector.field().low_mm;
         Self {
@@ -40,7 +40,7 @@ impl NodeGrid {
         }
     }
 
-    /// The grid with a node between every two neighbours.
+    /// The grid with an additional node between every two neighbours.
     pub fn refined(&self) -> Self {
         Self {
             columns: 2 * self.columns - 1,
@@ -64,7 +64,7 @@ impl NodeGrid {
         self.to_pixels_through(CUBIC, detector)
     }
 
-    /// Linear interpolation to the pixels of a detector, which keeps what is positive so.
+    /// Linear interpolation to the pixels of a detector, which preserves positive values.
     pub fn to_pixels_linear(self, detector: &Detector) -> Interpolation {
         self.to_pixels_through(LINEAR, detector)
     }
@@ -102,7 +102,7 @@ impl NodeGrid {
     }
 }
 
-/// Neighbours along an axis: polynomials of third and of first degree are met exactly.
+/// Number of neighbours along an axis; polynomials of third and of first degree are reproduced exactly.
 const CUBIC: usize = 4;
 const LINEAR: usize = 2;
 
@@ -111,7 +111,7 @@ const LINEAR: usize = 2;
 pub(crate) struct Interpolation {
     columns: Vec<Stencil>,
     rows: Vec<Stencil>,
-    /// Nodes along each axis, also those that nothing in between is near to.
+    /// Nodes along each axis, including those without a point nearby.
     nodes: [usize; 2],
 }
 
@@ -151,7 +151,7 @@ impl Stencil {
 }
 
 impl Interpolation {
-    /// How much each node adds to the sum of all values in between.
+    /// Contribution of each node to the sum of all interpolated values.
     pub fn shares(&self) -> Vec<f64> {
         let along = |stencils: &[Stencil], nodes: usize| {
             let mut sums = vec![0.0; nodes];
@@ -169,7 +169,7 @@ impl Interpolation {
             .collect()
     }
 
-    /// Values in between.
+    /// Interpolated values.
     pub fn values(&self, nodes: &[f64]) -> Vec<f64> {
         let across: Vec<f64> = nodes
             .chunks_exact(self.nodes[0])
@@ -219,7 +219,7 @@ mod tests {
         }
     }
 
-    /// Also where the nodes are so close that no pixel is near to the outermost ones.
+    /// Also if the nodes are so close that no pixel is near the outermost ones.
     #[test]
     fn shares_sum_up_what_the_pixels_get() {
         let detector = detector();
@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    /// A detector of one pixel, or one that is smaller than a step, has two nodes a side.
+    /// A detector of one pixel, or smaller than a step, has two nodes per side.
     #[test]
     fn the_smallest_detector_has_four_nodes() {
         let one = Detector::centred(1, 1, 0.5);

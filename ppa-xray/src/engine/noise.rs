@@ -9,16 +9,16 @@ use crate::detector::readout::DrawnLayer;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 
-/// What the pixels of a layer hold in the mean.
+/// Expected content of the pixels of a layer.
 pub(crate) struct ExpectedLayer {
     pub moments: Vec<Moments>,
-    /// What they count in the mean, if that differs.
+    /// Expected counts of the pixels, if they differ.
     pub counted: Option<Vec<Moments>>,
     /// Squared standard error of the mean energy, keV² per history.
     pub variance_kev2: Vec<f64>,
 }
 
-/// The layers in eV/cm² per history, `ev_cm2` to the keV, with the noise of `histories`; infinite for none.
+/// Draws the layers in eV/cm² per history, with `ev_cm2` per keV and the noise of `histories`; infinite for no noise.
 pub(crate) fn drawn(
     expected: &[ExpectedLayer; 4],
     ev_cm2: f64,
@@ -65,11 +65,11 @@ pub(crate) fn drawn(
     })
 }
 
-/// A draw of the mean energy per history, keV, that `histories` photons would have left.
+/// Samples the mean energy per history, keV, that `histories` photons would have deposited.
 ///
-/// The energy in a pixel is compound Poisson: N photons in the mean, each counted with its energy, so
+/// The energy in a pixel is compound Poisson: N photons on average, each counted with its energy, so
 /// mean N⟨E⟩ and variance N⟨E²⟩ (Swank, J. Appl. Phys. 44 (1973) 4199). A Poisson number of quanta, each of energy
-/// ⟨E²⟩/⟨E⟩, has the same mean and variance and never turns negative.
+/// ⟨E²⟩/⟨E⟩, has the same mean and variance and is never negative.
 pub(crate) fn draw(expected: &Moments, histories: f64, rng: &mut Philox) -> f64 {
     if expected.mean_kev <= 0.0 {
         return 0.0;
@@ -79,7 +79,7 @@ pub(crate) fn draw(expected: &Moments, histories: f64, rng: &mut Philox) -> f64 
     poisson(quanta, rng) * quantum_kev / histories
 }
 
-/// A Poisson number with the given mean.
+/// Samples a Poisson number with the given mean.
 fn poisson(mean: f64, rng: &mut Philox) -> f64 {
     if mean < 10.0 {
         multiplication(mean, rng)
@@ -109,7 +109,7 @@ fn transformed_rejection(mean: f64, rng: &mut Philox) -> f64 {
     let ln_mean = mean.ln();
     loop {
         let u = rng.unit() - 0.5;
-        // 1 − u lies in (0, 1], so the logarithm below stays finite.
+        // 1 − u is in (0, 1], so the logarithm below stays finite.
         let v = 1.0 - rng.unit();
         let us = 0.5 - u.abs();
         let k = ((2.0 * a / us + b) * u + mean + 0.43).floor();
@@ -142,7 +142,7 @@ fn ln_factorial(k: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Mean and variance of the draws against N⟨E⟩ and N⟨E²⟩, few and many quanta.
+    /// Mean and variance of the samples against N⟨E⟩ and N⟨E²⟩, for few and many quanta.
     #[test]
     fn noise_has_mean_and_variance_of_compound_poisson() {
         let expected = Moments {
@@ -168,7 +168,7 @@ mod tests {
         }
     }
 
-    /// The whole distribution at a mean where rejection has just taken over; chi² with 21 classes.
+    /// The full distribution at a mean where rejection has just taken over; chi² with 21 classes.
     #[test]
     fn poisson_numbers_follow_their_distribution() {
         let (mean, draws) = (12.0_f64, 100_000_u32);

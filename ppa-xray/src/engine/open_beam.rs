@@ -1,7 +1,7 @@
-//! Energy that unattenuated photons of every line deposit in the detector, by position: tabulated once, shared by all rays.
+//! Energy that unattenuated photons of every line deposit in the detector, by position, in a table shared by all rays.
 //!
-//! Fluence, spectrum and response vary over centimetres (cos³θ, heel effect, incidence on converter and grid): linear interpolation between
-//! nodes 2 mm apart is right to 1e-5.
+//! Fluence, spectrum and response vary over centimetres (cos³θ, heel effect, incidence on converter and grid); linear interpolation
+//! between nodes 2 mm apart is accurate to 1e-5.
 
 use nalgebra::Point2;
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use crate::beam::field::Field;
 /// Largest distance of the nodes, mm.
 const STEP_MM: f64 = 2.0;
 
-/// Mean and mean square of the energy that photons of every line leave, per cm² and history; padded to a multiple of
+/// Mean and mean square of the energy that photons of every line deposit, per cm² and history; padded to a multiple of
 /// [`WIDTH`](crate::vector_math::WIDTH) lines.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct LineMoments {
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use crate::vector_math::WIDTH;
 
-    /// cos³θ and a slope over half a metre at a distance of a metre, at the middle of a cell and beside the rim.
+    /// cos³θ and a slope over half a metre at a distance of a metre, at the middle of a cell and next to the rim.
     #[test]
     fn slow_changes_are_interpolated_to_1e_5() {
         let field = Field::centred([10.0, -20.0], [500.0, 301.0]);

@@ -1,4 +1,4 @@
-//! What paths need of a phantom, whatever the exposure is: basis materials, coarse cells, uniform blocks.
+//! Tables of a phantom for paths of any exposure: basis materials, coarse cells, uniform blocks.
 
 use std::sync::Arc;
 
@@ -7,10 +7,10 @@ use crate::engine::coarse_cells::CoarseCells;
 use crate::engine::uniform_blocks::UniformBlocks;
 use crate::transport::phantom_tables::PhantomTables;
 
-/// Cells of the coarse lattice: 2 MB, which the second cache of a core holds.
+/// Number of cells of the coarse lattice: 2 MB, which fits into the second-level cache of a core.
 const COARSE_CELLS: usize = 128 * 1024;
 
-/// Tables that all exposures of a phantom share.
+/// Tables shared by all exposures of a phantom.
 #[derive(Clone)]
 pub(crate) struct PathTables {
     pub(super) basis: Arc<AttenuationBasis>,
@@ -23,7 +23,7 @@ impl PathTables {
         Self::with_coarse_cells(tables, COARSE_CELLS)
     }
 
-    /// As [`PathTables::new`], with at most `cells` coarse cells.
+    /// The same as [`PathTables::new`], with at most `cells` coarse cells.
     pub fn with_coarse_cells(tables: &PhantomTables, cells: usize) -> Self {
         let phantom = &*tables.phantom;
         let basis = AttenuationBasis::new(&tables.attenuation, phantom.materials().len());

@@ -1,6 +1,6 @@
 //! Line integrals of mass through the voxels, and through coarser cells: Siddon, Med. Phys. 12 (1985) 252.
 //!
-//! A path goes from cell to cell. Cells are the voxels themselves, or, where the density is trilinear, the boxes between eight centres.
+//! A path goes from cell to cell. Cells are the voxels themselves or, if the density is trilinear, the boxes between eight centres.
 //!
 //! docs/physics.md, "Fast engine", primary.
 
@@ -35,7 +35,7 @@ impl<'a> Paths<'a> {
         Self::with_tables(transport, PathTables::new(&transport.tables))
     }
 
-    /// As [`Paths::new`], with tables that are made once for several exposures.
+    /// The same as [`Paths::new`], with tables shared by several exposures.
     pub fn with_tables(transport: &'a Transport<'a>, tables: PathTables) -> Self {
         let PathTables {
             basis,
@@ -52,7 +52,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// As [`Paths::new`], with at most `cells` coarse cells.
+    /// The same as [`Paths::new`], with at most `cells` coarse cells.
     #[cfg(test)]
     pub fn with_coarse_cells(transport: &'a Transport<'a>, cells: usize) -> Self {
         let tables = PathTables::with_coarse_cells(&transport.tables, cells);
@@ -64,7 +64,7 @@ impl<'a> Paths<'a> {
         self.coarse.edge == 1
     }
 
-    /// A point in cells from the corner of the box, if it lies in the box.
+    /// A point in cells from the corner of the box, if it is in the box.
     #[inline]
     pub fn cell_at(&self, point: &Point3<f64>) -> Option<Vector3<f64>> {
         let cell = self.lattice.ray(point, &Vector3::zeros()).origin;
@@ -73,7 +73,7 @@ impl<'a> Paths<'a> {
         inside.then_some(cell)
     }
 
-    /// The voxel at a point, if it lies in the box.
+    /// The voxel at a point, if it is in the box.
     #[inline]
     pub fn voxel_at(&self, point: &Point3<f64>) -> Option<usize> {
         let size = self.lattice.size;
@@ -103,7 +103,7 @@ impl<'a> Paths<'a> {
             + nearest_corner
     }
 
-    /// Where a path of `length_mm` is inside the box; nowhere is an empty stretch.
+    /// The part of a path of `length_mm` inside the box; an empty range if there is none.
     pub fn inside(
         &self,
         from: &Point3<f64>,
@@ -118,7 +118,7 @@ impl<'a> Paths<'a> {
             })
     }
 
-    /// Adds the masses on a path of `length_mm` along a unit vector: uniform blocks in one step each, all else cell by cell.
+    /// Adds the masses on a path of `length_mm` along a unit vector: uniform blocks in one step each, everything else cell by cell.
     #[inline(always)]
     fn add_path(
         &self,
@@ -183,7 +183,7 @@ impl<'a> Paths<'a> {
                 let last = codes.len() - (1 + row + layer) - 1;
                 let _ = walk(ray, size, from_mm, to_mm, |voxel, from_mm, to_mm| {
                     let lengths = corner_lengths(ray, from_mm, to_mm);
-                    // Rounding may lead a hair beyond the last cell.
+                    // Rounding may lead slightly beyond the last cell.
                     let voxel = voxel.min(last);
                     let mut corners = [(VoxelCode::default(), 0.0); 8];
                     for (side, offset) in [0, row, layer, row + layer].into_iter().enumerate() {
@@ -198,7 +198,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// Adds lengths in eight materials. Two sums do not wait for each other, and the mass is touched once. Loops, since
+    /// Adds lengths in eight materials. Two sums are independent of each other, and the mass is accessed once. Uses loops, since
     /// closures over the corners are not always inlined here.
     #[inline(always)]
     fn add_corners(&self, mass: &mut BasisMass, corners: &[(VoxelCode, f32); 8]) {
@@ -265,7 +265,8 @@ impl<'a> Paths<'a> {
         self.sum_path(from, to, self.interpolation, mass);
     }
 
-    /// Masses from one point to another through homogeneous voxels, whatever lies between their centres: on the average over paths the same.
+    /// Masses from one point to another through homogeneous voxels, regardless of the interpolation between their centres; the average over
+    /// paths is the same.
     pub fn between_in_voxels(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
         self.sum_path(from, to, Interpolation::Nearest, mass);
     }
@@ -279,7 +280,7 @@ impl<'a> Paths<'a> {
     ) {
         let (direction, length_mm) = towards(from, to);
         self.gather(mass, |mass| match interpolation {
-            // A copy of the walk for each.
+            // One copy of the walk for each.
             Interpolation::Nearest => {
                 self.add_path(from, &direction, length_mm, Interpolation::Nearest, mass);
             }
@@ -315,7 +316,7 @@ impl<'a> Paths<'a> {
     }
 }
 
-/// A ray of the box in cells of the codes, counted from the corner of the rim, or from the centre of the voxel there.
+/// Converts a ray of the box to cells of the codes, counted from the corner of the rim, or from the centre of the voxel there.
 #[inline(always)]
 fn cells(in_box: Ray, interpolation: Interpolation) -> Ray {
     Ray {
@@ -324,7 +325,7 @@ fn cells(in_box: Ray, interpolation: Interpolation) -> Ray {
     }
 }
 
-/// Cells of the codes before the corner of the box.
+/// Number of cells of the codes before the corner of the box.
 #[inline(always)]
 fn cells_before(interpolation: Interpolation) -> f64 {
     match interpolation {

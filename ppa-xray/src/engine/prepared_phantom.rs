@@ -1,4 +1,4 @@
-//! A phantom with the tables that all its fast exposures share.
+//! A phantom with the tables shared by all its fast exposures.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::phantom_tables::PhantomTables;
 use crate::transport::tracking::TransportError;
 
-/// A phantom with the tables that all its fast exposures share, whatever their pose, beam and detector are.
+/// A phantom with the tables shared by all its fast exposures, for any pose, beam and detector.
 ///
 /// For a hundred million voxels they take 2 CPU seconds and 400 MB.
 pub struct PreparedPhantom<'a> {
@@ -21,7 +21,7 @@ pub struct PreparedPhantom<'a> {
     tables: FastTables<'a>,
 }
 
-/// What the fast engine needs of a phantom.
+/// Data of a phantom that the fast engine needs.
 pub(super) struct FastTables<'a> {
     pub transport: Arc<PhantomTables<'a>>,
     pub paths: PathTables,
@@ -72,7 +72,7 @@ impl<'a> PreparedPhantom<'a> {
     }
 
     /// # Errors
-    /// [`TransportError::ComptonModel`] when the phantom was prepared for another one than `found`.
+    /// [`TransportError::ComptonModel`] if the phantom was prepared for another model than `found`.
     pub(super) fn check_model(&self, found: ComptonModel) -> Result<(), TransportError> {
         if found == self.compton_model {
             return Ok(());

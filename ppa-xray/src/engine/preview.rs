@@ -1,16 +1,16 @@
-//! What a preview of a fast exposure simulates: larger pixels, fewer histories for the scatter.
+//! Simplifications for a preview of a fast exposure: larger pixels, fewer histories for the scatter.
 
 use crate::beam::detector::Detector;
 use crate::beam::receptor::Receptor;
 use crate::engine::fast_settings::FastSettings;
 
-/// Fewest pixels along the shorter side of a preview, unless the image has fewer.
+/// Smallest number of pixels along the shorter side of a preview, unless the image has fewer.
 const LEAST_PIXELS: u32 = 96;
 
-/// Most rays per pixel side of the primary.
+/// Largest number of primary rays per pixel side.
 const SAMPLES_PER_SIDE: u32 = 2;
 
-/// Histories for the scatter of an image, over those of its preview.
+/// Ratio of the scatter histories of an image to those of its preview.
 const HISTORIES: u64 = 32;
 
 /// The settings with fewer histories for the scatter and fewer rays.
@@ -22,8 +22,8 @@ pub(super) fn settings(image: &FastSettings) -> FastSettings {
     }
 }
 
-/// The receptor with gains of larger pixels, which differ as means of those of the image do, and with the mean of a stationary grid, whose lines larger
-/// pixels would show as other moiré.
+/// The receptor with gains of larger pixels, which vary like means of those of the image, and with the mean of a stationary grid, whose
+/// lines would cause different moiré in larger pixels.
 pub(super) fn receptor(image: &Receptor, detector: &Detector) -> Receptor {
     let mut receptor = image.clone();
     receptor.gain_error /= f64::from(binning(detector));

@@ -16,12 +16,12 @@ use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
 use crate::vector_math::{WIDTH, exp, pad};
 
-/// What all rays share.
+/// Data shared by all rays.
 pub(crate) struct PrimaryRays<'a> {
     pub transport: &'a Transport<'a>,
     paths: &'a Paths<'a>,
     lines: SpectralLines,
-    /// Of every basis material, line by line, padded to a multiple of [`WIDTH`].
+    /// Attenuation of every basis material, line by line, padded to a multiple of [`WIDTH`].
     attenuation: Vec<Vec<f32>>,
     response: LineResponse<'a>,
 }
@@ -29,7 +29,7 @@ pub(crate) struct PrimaryRays<'a> {
 /// Buffers of one thread.
 pub(crate) struct Scratch {
     mass: Vec<[f32; LANES]>,
-    /// With nothing in the beam: first two moments of the energy per cm² and history that stays in the detector.
+    /// First two moments of the energy per cm² and history deposited in the detector with nothing in the beam.
     open: LineMoments,
 }
 
@@ -73,7 +73,7 @@ impl<'a> PrimaryRays<'a> {
         self.pixel(pixel).overlap(self.transport.emitter.field())
     }
 
-    /// What would stay in the detector at `at` with nothing in the beam, mean over `spots`.
+    /// Energy deposited in the detector at `at` with nothing in the beam, averaged over `spots`.
     fn open(&self, spots: &[Point3<f64>], at: Point2<f64>) -> LineMoments {
         let emitter = &self.transport.emitter;
         let mut open = vec![Moments::default(); self.lines.energy_kev.len()];
@@ -97,14 +97,14 @@ impl<'a> PrimaryRays<'a> {
         }
     }
 
-    /// [`PrimaryRays::aim`] for all places that the field lights on the detector.
+    /// [`PrimaryRays::aim`] for all points of the detector in the field.
     pub fn open_beam(&self, spots: &[Point3<f64>]) -> Option<OpenBeam> {
         let detector = self.transport.projection.detector.field();
         let lit = detector.overlap(self.transport.emitter.field())?;
         Some(OpenBeam::new(&lit, |at| self.open(spots, at)))
     }
 
-    /// Prepares for rays to `at` and close by: what would stay in the detector there with nothing in the beam, mean over
+    /// Prepares for rays to `at` and nearby: energy deposited in the detector there with nothing in the beam, averaged over
     /// `spots`.
     pub fn aim(&self, spots: &[Point3<f64>], at: Point2<f64>, scratch: &mut Scratch) {
         scratch.open = self.open(spots, at);
@@ -115,8 +115,8 @@ impl<'a> PrimaryRays<'a> {
         open_beam.interpolate(at, &mut scratch.open);
     }
 
-    /// Moments of the energy per cm² and history that arrives on the way from `spot` to `at`, close to where the rays were
-    /// aimed at.
+    /// Moments of the energy per cm² and history that arrives on the path from `spot` to `at`, which is close to the prepared
+    /// point.
     #[inline]
     pub fn behind(&self, spot: &Point3<f64>, at: Point2<f64>, scratch: &mut Scratch) -> Moments {
         let Scratch { mass, open } = scratch;

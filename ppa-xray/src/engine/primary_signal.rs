@@ -1,4 +1,4 @@
-//! The primary image as tolerance of the scatter estimate: its quantum noise at each point.
+//! The primary image as the tolerance of the scatter estimate: its quantum noise at each point.
 //!
 //! docs/physics.md, "Fast engine", first collisions.
 
@@ -9,13 +9,13 @@ use crate::engine::node_grid::NodeGrid;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
 
-/// Steps along the longer side of the detector at which it is looked at what noise hides.
+/// Number of steps along the longer side of the detector at which tolerances are computed.
 const TOLERANCES: f64 = 15.0;
 
-/// Scatter in the dark, relative to the open field, more or less.
+/// Approximate scatter in the dark relative to the open field.
 const LEAST_SCATTER: f64 = 0.01;
 
-/// The primary image, to compare scatter with.
+/// The primary image, for comparison with scatter.
 pub(crate) struct PrimarySignal<'a> {
     pub detector: &'a Detector,
     pub moments: &'a [Moments],
@@ -35,8 +35,8 @@ impl PrimarySignal<'_> {
         self.moments[row * self.detector.columns as usize + column].mean_kev
     }
 
-    /// Points of the detector plane, and the errors of scatter there that the noise of an exposure hides, relative to each
-    /// other: the roots of the signal.
+    /// Points of the detector plane, and the relative errors of scatter there that the noise of an exposure hides:
+    /// the square roots of the signal.
     pub fn tolerances(&self, transport: &Transport) -> Vec<(Point3<f64>, f64)> {
         let [width, height] = self.detector.field().size_mm();
         let grid = NodeGrid::new(self.detector, width.max(height) / TOLERANCES);

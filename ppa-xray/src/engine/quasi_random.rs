@@ -7,8 +7,8 @@ use ppa_core::random::Philox;
 
 /// Randomly shifted multiples of fixed irrational numbers, modulo 1 (a Kronecker sequence).
 ///
-/// Each point by itself is uniform, so averages are unbiased; together they spread evenly, so averages of smooth
-/// functions converge nearly as 1/n. The irrational numbers are powers of 1/g, g being the root of g^(d+1) = g + 1.
+/// Each point by itself is uniform, so averages are unbiased. Together the points are evenly distributed, so averages of smooth
+/// functions converge nearly as 1/n. The irrational numbers are powers of 1/g, where g is the root of g^(d+1) = g + 1.
 #[derive(Debug, Clone)]
 pub(crate) struct QuasiRandom<const D: usize> {
     point: [u64; D],
@@ -24,7 +24,7 @@ impl<const D: usize> QuasiRandom<D> {
         }
         let whole = 2.0_f64.powi(64);
         Self {
-            // Two numbers of 32 bits.
+            // Two random numbers of 32 bits.
             point: [(); D].map(|()| {
                 let high = (rng.unit() * 4_294_967_296.0) as u64;
                 (high << 32) | (rng.unit() * 4_294_967_296.0) as u64

@@ -21,12 +21,12 @@ const SPOT_POINTS: usize = 8;
 
 /// Energy of unscattered photons per pixel, row-major, eV/cm² per history.
 ///
-/// Each pixel is the mean over `samples_per_side`² evenly spread rays, from each of 64 points if the focal spot is not one;
-/// rays through pixel centres alone are off by up to 13 % at sharp edges. All energies of the spectrum take part. Between
-/// the centres of voxels the density is that of the transport.
+/// Each pixel is the mean over `samples_per_side`² evenly spaced rays, from each of 64 points unless the focal spot is a point.
+/// Rays through pixel centres alone are wrong by up to 13 % at sharp edges. All energies of the spectrum are included. Between
+/// the centres of voxels the density is interpolated as in the transport.
 ///
 /// # Errors
-/// As [`crate::analog`]; also when `samples_per_side` is not 1 to 64.
+/// The same as [`crate::analog`]; also if `samples_per_side` is not 1 to 64.
 pub fn primary(
     phantom: &VoxelPhantom,
     spectrum: &Spectrum,
@@ -47,7 +47,7 @@ pub fn primary(
     Ok(moments.iter().map(|m| m.mean_kev * ev_cm2).collect())
 }
 
-/// First two moments per history of the primary energy in every pixel, for the spot of the exposure's emitter.
+/// First two moments per history of the primary energy in every pixel, for the focal spot of the exposure's emitter.
 fn of_spot(exposure: &Exposure, samples_per_side: u32) -> Vec<Moments> {
     let transport = &exposure.transport;
     let paths = Paths::new(transport);
@@ -72,7 +72,7 @@ pub(crate) fn check_samples(samples_per_side: u32) -> Result<(), TransportError>
     })
 }
 
-/// A rectangle by the midpoints of `samples_per_side`² parts.
+/// Samples a rectangle at the midpoints of `samples_per_side`² parts.
 fn sampled(
     rays: &PrimaryRays,
     spots: &[Point3<f64>],

@@ -32,7 +32,7 @@ mod tests {
                 assert!((rotated.dot(&direction) - 0.3).abs() < 1e-12);
                 mean += rotated / 8.0;
             }
-            // Azimuths all around: what is left is the part along the old direction.
+            // Azimuths all around: only the part along the old direction remains.
             assert!((mean - 0.3 * direction).norm() < 1e-12);
         }
     }

@@ -10,7 +10,7 @@ use crate::transport::tally::Moments;
 #[derive(Debug)]
 pub(crate) struct ScatterField {
     pub grid: NodeGrid,
-    /// Estimate by estimate.
+    /// Moments by estimate, then by node.
     pub estimates: Vec<Vec<Moments>>,
 }
 
@@ -54,7 +54,7 @@ impl ScatterField {
                 .into_iter()
                 .zip(squares)
                 .map(|(mean_kev, square_kev2)| {
-                    // Beside nothing the cubics may swing below nothing.
+                    // Next to zero values the cubics may become negative.
                     let is_light = mean_kev > 0.0 && square_kev2 > 0.0;
                     let moments = Moments {
                         mean_kev,
@@ -68,8 +68,8 @@ impl ScatterField {
         }
     }
 
-    /// Covariance of the errors of the mean energies of two fields on one grid in every pixel, keV²; of a field with
-    /// itself their variance.
+    /// Covariance of the errors of the mean energies of two fields on one grid in every pixel, keV²; for a field with
+    /// itself, their variance.
     pub fn covariance_kev2(&self, other: &Self, detector: &Detector) -> Vec<f64> {
         let count = self.estimates.len() as f64;
         let (these, those) = (self.deviations(), other.deviations());
@@ -86,7 +86,7 @@ impl ScatterField {
         covariance.map(|per_cm4| per_cm4 * cm4).collect()
     }
 
-    /// What the estimates differ by from their mean.
+    /// Deviations of the estimates from their mean.
     ///
     /// Neighbouring nodes share part of their errors, so the estimates are interpolated before they are compared; half
     /// way between the nodes is close enough.
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// Var(a + b) = Var(a) + Var(b) + 2 Cov(a, b) in every pixel, whatever the estimates of a and b have in common.
+    /// Var(a + b) = Var(a) + Var(b) + 2 Cov(a, b) in every pixel, for any correlation of the estimates of a and b.
     #[test]
     fn errors_of_a_sum_are_those_of_its_parts_and_what_they_share() {
         let detector = Detector::centred(23, 17, 4.0);

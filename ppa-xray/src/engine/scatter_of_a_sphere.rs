@@ -14,7 +14,7 @@ use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::transport::tally::Category;
 
-/// What interpolation between the points of the fast engine may add.
+/// Allowance for the interpolation between the points of the fast engine.
 const BETWEEN: f64 = 0.008;
 
 /// Energy per history, keV, and its standard error, ring by ring.
@@ -53,7 +53,7 @@ fn assert_agree(what: &str, found: &Rings, expected: &[f64; RINGS], slack: f64) 
             off.abs() < 4.5 * se + slack * expected,
             "{what}, ring {place} of {RINGS}: {value} ± {se} keV, integral {expected}"
         );
-        // Else the comparison would say little.
+        // Otherwise the comparison would not be sensitive.
         assert!(se < 0.15 * expected, "{what}, ring {place}: {value} ± {se}");
     }
 }
@@ -112,7 +112,7 @@ fn single_and_multiple_scatter_of_a_water_sphere() {
 #[test]
 fn fast_scatter_of_a_water_sphere() {
     let scene = water_sphere();
-    // The Rayleigh peak is narrow so near to the detector: close points. Few photons scatter twice in so small a sphere.
+    // The Rayleigh peak is narrow so close to the detector, so points are close. Few photons scatter twice in so small a sphere.
     let (single, multiple) = (scene.fast(60_000, 4.0), scene.fast(300_000, 12.0));
     for (category, expected, slack) in of_the_water_sphere(&scene) {
         let image = match category {
@@ -132,7 +132,7 @@ fn fast_scatter_of_a_water_sphere() {
             off.abs() < 5.0 * se + slack + BETWEEN,
             "{category:?}: {off} ± {se}"
         );
-        // Else the comparison would say little.
+        // Otherwise the comparison would not be sensitive.
         assert!(
             se < if category == Category::Multiple {
                 0.01
@@ -144,9 +144,9 @@ fn fast_scatter_of_a_water_sphere() {
     }
 }
 
-/// Off hydrogen at 140 keV, where its electron is as good as free, photons scatter as Klein and Nishina (Z. Phys. 52
-/// (1929) 853) say, in absolute numbers: 0.992 electrons per atomic mass unit, no datum of the tables in between.
-/// Below 10° binding shows.
+/// Scattering off hydrogen at 140 keV, where its electron is nearly free, follows Klein and Nishina (Z. Phys. 52
+/// (1929) 853) in absolute numbers: 0.992 electrons per atomic mass unit, with no data from the tables in between.
+/// Below 10° the binding has an effect.
 #[test]
 fn klein_nishina_limit() {
     let scene = Scene {
@@ -166,13 +166,13 @@ fn klein_nishina_limit() {
     ] {
         let image = scene.simulate(3_000_000, model);
         let mut found = tallied(&image, Category::Compton);
-        // Left out of the comparison and of the sum.
+        // Excluded from the comparison and from the sum.
         (found[0], expected[0]) = (found[1], expected[1]);
         assert_agree(&format!("{model:?}"), &found, &expected, 0.006);
     }
 }
 
-/// In a thin sphere the n-th order goes as the n-th power of the density, to the accuracy of its attenuation.
+/// In a thin sphere the n-th order is proportional to the n-th power of the density, to the accuracy of its attenuation.
 #[test]
 fn scatter_of_order_n_goes_as_the_nth_power_of_the_density() {
     let at = |density_g_cm3| {
@@ -193,7 +193,7 @@ fn scatter_of_order_n_goes_as_the_nth_power_of_the_density() {
         let exponent = (b / a).log2();
         let se = (se_a / a).hypot(se_b / b) / std::f64::consts::LN_2;
         println!("{}: exponent {exponent:.3} ± {se:.3}", category.name());
-        // Attenuation by half a diameter more takes 8 %, or 0.12 of the exponent, and the third order adds to the second.
+        // Attenuation by half a diameter more removes 8 %, or 0.12 of the exponent, and the third order adds to the second.
         assert!(
             (f64::from(order) - 0.15 - 4.5 * se..f64::from(order) + 0.05 + 4.5 * se)
                 .contains(&exponent),

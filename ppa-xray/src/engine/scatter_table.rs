@@ -11,11 +11,11 @@ use crate::transport::attenuation::Coefficients;
 /// Steps of sin(θ/2), in which forward peaks are wide: at 150 keV the Rayleigh peak of heavy elements covers 10 of them.
 pub(super) const STEPS: usize = 512;
 
-/// Interval, in steps, at which the mean energy after Compton scattering is computed, and the number of draws for it.
+/// Interval, in steps, at which the mean energy after Compton scattering is computed, and the number of samples for it.
 const ENERGY_STEPS: usize = 8;
 const DRAWS: u32 = 32;
 
-/// Scattering of a gram, mm⁻¹ per g/cm³ and sr, and the mean energy that Compton scattering leaves.
+/// Scattering of a gram, mm⁻¹ per g/cm³ and sr, and the mean energy after Compton scattering.
 #[derive(Debug)]
 pub(crate) struct ScatterTable {
     rows: Vec<[f32; 3]>,
@@ -33,7 +33,7 @@ impl ScatterTable {
         let rayleigh = f64::from(c.total - c.with_compton);
         let mean_kev: Vec<f64> = (0..=STEPS / ENERGY_STEPS)
             .map(|node| {
-                // The draws are part of the table: the same for every image.
+                // The random samples are part of the table: the same for every image.
                 let mut rng = Philox::new(0, 0, node as u64);
                 let draw = |_| {
                     tables.compton_energy_at(energy_kev, cos(node * ENERGY_STEPS), || rng.unit())
@@ -59,7 +59,7 @@ impl ScatterTable {
         }
     }
 
-    /// Where an angle lies between two steps.
+    /// Position of an angle between two steps.
     #[inline]
     pub fn locate(cos_theta: f64) -> (usize, f32) {
         let at = (0.5 * (1.0 - cos_theta)).max(0.0).sqrt() * STEPS as f64;

@@ -1,8 +1,8 @@
 //! Photons scattered once: next-event estimation (forced detection) at points of the detector.
 //!
 //! Estimator: a point samples collisions of the lists by its importance model, with systematic sampling, and scores
-//! w · dσ/dΩ · exp(−∫µ ds) · cos θ / r² · response for each. Coarse cells give the optical depth; a quarter of the samples add the exact value minus
-//! the coarse one, times four (two-level estimator: Giles, Oper. Res. 56 (2008) 607), so the expectation is that of the voxels.
+//! w · dσ/dΩ · exp(−∫µ ds) · cos θ / r² · response for each. Coarse cells give the optical depth; a quarter of the samples add the exact
+//! value minus the coarse one, times four (two-level estimator: Giles, Oper. Res. 56 (2008) 607), so the expectation is that of the voxels.
 //! Kalos, Nucl. Sci. Eng. 16 (1963) 111; docs/physics.md, "Fast engine", single scatter.
 
 use nalgebra::{Point2, Point3};
@@ -29,9 +29,9 @@ const CORRECTION_INTERVAL: u32 = 4;
 /// Estimates at a point of the detector.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct NodeEstimate {
-    /// Energy per cm² and history that Compton and Rayleigh scatter leave in the detector.
+    /// Energy per cm² and history that Compton and Rayleigh scatter deposit in the detector.
     pub estimates: [[Moments; 2]; ESTIMATES],
-    /// Largest share of both that a single collision added.
+    /// Largest share of a single collision in both.
     pub largest_share: f64,
 }
 
@@ -45,12 +45,12 @@ pub(crate) struct SingleScatter<'a> {
     pub lists: &'a [FirstCollisions],
 }
 
-/// How a point samples the collisions of each list.
+/// Sampling of the collisions of each list at a point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PointSampling {
     /// Mean number of collisions sampled.
     pub collisions: f64,
-    /// Interval of the sites of the list that take part.
+    /// Interval of the sites of the list that are used.
     pub every: usize,
 }
 
@@ -71,7 +71,7 @@ struct Buffers {
 
 /// A collision and the direction from it to the point.
 struct PathToPoint<'a> {
-    /// Photons that get to the collision, line by line.
+    /// Photons that reach the collision, line by line.
     photons: &'a [f32],
     incidence: Incidence<'a>,
 }
@@ -79,7 +79,7 @@ struct PathToPoint<'a> {
 impl SingleScatter<'_> {
     /// Scatter at a point of the detector.
     ///
-    /// Point `index` of a seed has the same random numbers whatever is computed beside it.
+    /// Point `index` of a seed has the same random numbers regardless of the other points.
     pub fn at(
         &self,
         at: Point2<f64>,
@@ -130,7 +130,7 @@ impl SingleScatter<'_> {
         result
     }
 
-    /// Compton and Rayleigh part of what one collision brings to `target`, per mm².
+    /// Compton and Rayleigh part of the contribution of one collision to `target`, per mm².
     fn contribution(
         &self,
         target: &Point3<f64>,
@@ -173,7 +173,7 @@ impl SingleScatter<'_> {
         energies.map(|part| part.scaled(along.z / (r * r * r)))
     }
 
-    /// Energy that the photons of a collision leave in the detector behind the masses `after` it, per solid angle; `photons` is a buffer.
+    /// Energy that the photons of a collision deposit in the detector behind the masses `after` it, per solid angle; `photons` is a buffer.
     fn energies(
         &self,
         path: &PathToPoint,

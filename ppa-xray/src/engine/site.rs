@@ -1,4 +1,4 @@
-//! A collision site: place, direction and weight; docs/physics.md, "Fast engine", first collisions.
+//! A collision site: position, direction and weight; docs/physics.md, "Fast engine", first collisions.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,7 +9,7 @@ pub(crate) struct Site {
     pub direction: Vector3<f32>,
     /// Statistical weight relative to the other sites.
     pub weight: f32,
-    /// Attenuation coefficient of the outgoing photon over that at the typical energy.
+    /// Ratio of the attenuation coefficient of the outgoing photon to that at the typical energy.
     pub attenuation_ratio: f32,
     pub material: u8,
 }

@@ -1,4 +1,4 @@
-//! A scene for tests: quick to simulate, with all that makes scatter uneven.
+//! A scene for tests: quick to simulate, with every cause of uneven scatter.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;

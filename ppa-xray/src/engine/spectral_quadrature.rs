@@ -1,4 +1,4 @@
-//! Gauss quadrature of the spectrum between absorption edges, with as few energies as the accuracy asks for.
+//! Gauss quadrature of the spectrum between absorption edges, with as few energies as the accuracy requires.
 //!
 //! Golub and Welsch, Math. Comp. 23 (1969) 221; docs/physics.md, "Fast engine", primary.
 
@@ -7,16 +7,16 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use crate::beam::spectral_lines::SpectralLines;
 use crate::engine::exposure::Exposure;
 
-/// How accurate a quadrature over a spectrum is.
+/// Accuracy of a quadrature over a spectrum.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Accuracy {
-    /// Most energies between two absorption edges.
+    /// Largest number of energies between two absorption edges.
     pub most: usize,
-    /// Largest relative error of energy and squared energy behind any thickness with fewer energies than [`Accuracy::most`].
+    /// Largest relative error of energy and squared energy behind any thickness if there are fewer energies than [`Accuracy::most`].
     pub tolerance: f64,
 }
 
-/// Energies of the quadrature over the spectrum: errors are then 3e-5 of the primary behind any thickness, and 1e-3 of the scatter.
+/// Energies of the quadrature over the spectrum; the errors are then 3e-5 of the primary behind any thickness, and 1e-3 of the scatter.
 pub(crate) const PRIMARY_ENERGIES: Accuracy = Accuracy {
     most: 12,
     tolerance: 1e-5,
@@ -29,13 +29,13 @@ pub(crate) const SCATTER_ENERGIES: Accuracy = Accuracy {
 /// Thicknesses at which errors are evaluated: attenuation exponents at the mean energy of the spectrum.
 const EXPONENTS: [f64; 7] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 
-/// Energies between the absorption edges of phantom and detector, the same for every spectrum that the source has.
+/// Energies between the absorption edges of phantom and detector, the same for every spectrum of the source.
 ///
-/// Integrals of smooth functions over a spectrum of 110 bins need no 110 energies: the Gauss quadrature of the
+/// Integrals of smooth functions over a spectrum of 110 bins do not need 110 energies: the Gauss quadrature of the
 /// spectrum with n energies is exact for polynomials of degree 2n − 1 in 1/E (Golub and Welsch, Math. Comp.
-/// 23 (1969) 221). An absorption edge is not smooth: the spectrum is cut there. The energies are those of the mean of all
+/// 23 (1969) 221). An absorption edge is not smooth, so the spectrum is cut there. The energies are those of the mean of all
 /// spectra; the weights of a single one, which differs little, are exact for polynomials of degree n − 1 times the mean.
-/// A piece of the spectrum that holds few photons or a narrow range of energies needs few of them.
+/// A piece of the spectrum with few photons or a narrow range of energies needs few of them.
 pub(crate) fn compressed(exposure: &Exposure, accuracy: Accuracy) -> SpectralLines {
     let transport = &exposure.transport;
     let mut edges: Vec<f64> = transport
@@ -93,7 +93,7 @@ fn gauss(lines: &SpectralLines, edges_kev: &[f64], accuracy: Accuracy) -> Spectr
 
 /// Energy and squared energy of the mean of all spectra behind absorbers of all [`EXPONENTS`].
 ///
-/// Between edges attenuation is a constant and a multiple of 1/E³, more or less; the constant cancels in relative errors.
+/// Between edges attenuation is approximately a constant plus a multiple of 1/E³; the constant cancels in relative errors.
 struct Transmission {
     mean_kev: f64,
 }
@@ -162,8 +162,8 @@ fn smooth_piece(lines: &SpectralLines, nodes: usize) -> SpectralLines {
     let eigen = SymmetricEigen::new(jacobi);
     let mut order: Vec<usize> = (0..nodes).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    // An eigenvector holds the polynomials at its energy times the root of the weight there; what a spectrum's polynomials
-    // sum up to must come out again.
+    // An eigenvector contains the polynomials at its energy times the square root of the weight there; it must reproduce the sums of
+    // the polynomials over a spectrum.
     let weights = lines.weights.iter().map(|weights| {
         let moments: Vec<f64> = basis
             .iter()
@@ -215,7 +215,7 @@ mod tests {
             .sum()
     }
 
-    /// Energy and squared energy behind water, bone and copper, from the anode's side to the other: the same 12 energies for
+    /// Energy and squared energy behind water, bone and copper, from the anode side to the opposite side: the same 12 energies for
     /// 100 bins of three spectra.
     #[test]
     fn a_dozen_energies_stand_for_all_spectra_of_a_source() {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     /// The edges of lead, caesium and iodine divide the spectrum of 100 kVp into seven pieces. Fewer than half of the possible 84 energies
-    /// keep energy and squared energy behind water and bone within 1.4e-4, twice the tolerance of each of the pieces.
+    /// are accurate to 1.4e-4 in energy and squared energy behind water and bone, twice the tolerance of each piece.
     #[test]
     fn quadrature_uses_few_energies_within_its_tolerance() {
         let filters = vec!["Al:2.5".parse().unwrap()];

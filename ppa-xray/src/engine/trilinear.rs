@@ -2,11 +2,11 @@
 
 use crate::phantom::lattice::Ray;
 
-/// Lengths, mm, that the eight corners of a cell stand for on a piece of a ray from one length to another in that cell: the integral of
-/// the density is their sum, each times the density of its corner.
+/// Weights, mm, of the eight corners of a cell for a piece of a ray from one length to another in that cell: the integral of
+/// the density is the sum of the corner densities times their weights.
 ///
-/// The density along a ray is a cubic in such a cell, so Gauss's rule of two points is exact. Corner x + 2 y + 4 z lies on the upper side
-/// of the axes whose bits are set; the ray counts cells from a corner of the lattice, and its numbers are not negative here.
+/// The density along a ray is a cubic in such a cell, so the two-point Gauss rule is exact. Corner x + 2 y + 4 z is on the upper side
+/// of the axes whose bits are set; the ray counts cells from a corner of the lattice, and its coordinates are non-negative here.
 #[inline(always)]
 pub(super) fn corner_lengths(ray: &Ray, from_mm: f64, to_mm: f64) -> [f32; 8] {
     const NODE: f64 = 0.577_350_269_189_625_8; // 1/√3
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Against 2000 midpoints, for densities of any values at the corners.
+        /// Against 2000 midpoints, for arbitrary densities at the corners.
         #[test]
         fn lengths_integrate_a_trilinear_density_exactly(
             from in prop::array::uniform3(0.0..1.0_f64),

@@ -1,4 +1,4 @@
-//! Tube load of an exposure: a number of mAs, or what automatic exposure control finds.
+//! Tube load of an exposure: a number of mAs, or the result of automatic exposure control.
 
 use std::ops::ControlFlow;
 
@@ -10,7 +10,7 @@ use crate::engine::fast_settings::FastSettings;
 use crate::engine::prepared_phantom::PreparedPhantom;
 use crate::transport::tracking::TransportError;
 
-/// How much radiation an exposure takes.
+/// Amount of radiation of an exposure.
 ///
 /// In a file it is `{ mas = 4 }` or `{ exposure_index = 250 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub enum TubeLoad {
 }
 
 impl TubeLoad {
-    /// What the number may be: the noise of an image stands for at most 1e18 histories.
+    /// Allowed values; the noise of an image represents at most 1e18 histories.
     const RANGE: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
     /// # Errors
@@ -47,14 +47,14 @@ impl TubeLoad {
 }
 
 impl PreparedPhantom<'_> {
-    /// The histories of a tube load, for [`FastSettings::dose_histories`].
+    /// Number of histories of a tube load, for [`FastSettings::dose_histories`].
     ///
-    /// For an exposure index they follow from a [`preview`](PreparedPhantom::preview) without noise, which takes less than a tenth of the
-    /// time of the image. The index of the image then differs from the one asked for by less than 2 %, mostly by the noise of a pixel.
+    /// For an exposure index it is computed from a [`preview`](PreparedPhantom::preview) without noise, which takes less than a tenth of
+    /// the time of the image. The index of the image then differs from the requested one by less than 2 %, mostly because of pixel noise.
     ///
     /// # Errors
-    /// As [`PreparedPhantom::fast`]; [`TransportError::TubeLoad`] when nothing reaches the receptor, or the spectrum does not come
-    /// from the tube model, which alone knows its photons per mAs.
+    /// The same as [`PreparedPhantom::fast`]; [`TransportError::TubeLoad`] if nothing reaches the receptor, or if the spectrum does not
+    /// come from the tube model, the only source of photons per mAs.
     pub fn histories(
         &self,
         load: TubeLoad,

@@ -1,4 +1,4 @@
-//! Uniform blocks of cells, such as air around the limb: a path crosses one in a single step.
+//! Uniform blocks of cells, such as air around the limb, which a path crosses in a single step.
 
 use rayon::prelude::*;
 
@@ -7,10 +7,10 @@ use crate::transport::voxel_codes::{VoxelCode, VoxelCodes};
 /// Cells along the edge of a block.
 pub(super) const EDGE: usize = 16;
 
-/// Density up to which a block is taken for air, g/cm³.
+/// Density up to which a block counts as air, g/cm³.
 const AIR_G_CM3: f32 = 2e-3;
 
-/// Blocks of [`EDGE`]³ cells, and which of them are uniform: of one material and density.
+/// Blocks of [`EDGE`]³ cells, and which of them are uniform in material and density.
 pub(super) struct UniformBlocks {
     /// Blocks along each axis.
     pub size: [usize; 3],
@@ -19,7 +19,7 @@ pub(super) struct UniformBlocks {
 }
 
 impl UniformBlocks {
-    /// Blocks of cells, each of which depends on the voxel of the same index and on `halo` voxels after that along each axis.
+    /// Builds blocks of cells, each of which depends on the voxel of the same index and on `halo` voxels after that along each axis.
     pub fn new(codes: &VoxelCodes, halo: usize) -> Self {
         let voxels = codes.size();
         let size = voxels.map(|count| count.div_ceil(EDGE));
@@ -45,7 +45,7 @@ impl UniformBlocks {
         Self { size, code }
     }
 
-    /// Blocks none of which is uniform.
+    /// Blocks of which none is uniform.
     #[cfg(test)]
     pub fn mixed(size: [usize; 3]) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl UniformBlocks {
 mod tests {
     use super::*;
 
-    /// 18 x 15 x 14 voxels, which are 20 x 17 x 16 with the rim, one of them different: the blocks that hold it are mixed, and with a
+    /// 18 x 15 x 14 voxels, which are 20 x 17 x 16 with the rim, one of them different: the blocks that contain it are mixed, and with a
     /// halo those before them; all others are uniform, including incomplete blocks.
     #[test]
     fn one_different_voxel_makes_its_block_mixed() {

@@ -7,9 +7,9 @@ use crate::image::radiograph::Radiograph;
 use crate::transport::stream::Stream;
 
 impl Radiograph {
-    /// Adds electronic noise with the standard deviation `noise_kev` per pixel, in a layer of its own.
+    /// Adds electronic noise with the standard deviation `noise_kev` per pixel, as a separate layer.
     ///
-    /// It does not depend on the exposure, so per history it falls with the histories that the image stands for.
+    /// It does not depend on the exposure, so per history it decreases with the histories that the image represents.
     #[must_use]
     pub(crate) fn with_electronic_noise(mut self, noise_kev: f64) -> Self {
         if noise_kev > 0.0 && self.histories.is_finite() {

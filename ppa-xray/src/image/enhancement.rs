@@ -1,34 +1,34 @@
-//! Multi-scale contrast enhancement that leaves noise and strong edges alone.
+//! Multi-scale contrast enhancement that does not amplify noise and strong edges.
 
 use crate::image::latitude::LatitudeReduction;
 use crate::image::pyramid::{Plane, white_noise_of_bands};
 
-/// Local mean square of a band, over that of its noise, at which detail gets half its lift.
+/// Ratio of the local mean square of a band to that of its noise at which detail gets half its lift.
 const NOISE_CORE: f32 = 4.0;
 
-/// What is lifted, and how much.
+/// Selection and amount of the lift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lift {
-    /// What the image went through: small, faint, significant detail gets back what it took.
+    /// Latitude reduction of the image; small, faint, significant detail regains the contrast lost by it.
     pub reduction: LatitudeReduction,
     /// Share of the contrast before the reduction that is added to such detail.
     pub detail: f64,
-    /// Size from which detail is lifted less than half, in pixels.
+    /// Size above which detail is lifted by less than half, in pixels.
     pub size_px: f64,
-    /// Contrast before the reduction from which detail is lifted less than half.
+    /// Contrast before the reduction above which detail is lifted by less than half.
     pub edge: f64,
 }
 
-/// An image of reduced latitude with every band of its Laplacian pyramid lifted.
+/// Lifts every band of the Laplacian pyramid of an image of reduced latitude.
 ///
-/// A detail d in a band of size b becomes d (1 + (D (1 + L) − 1) n e b′) with L the share `detail` and D the divisor of the latitude reduction at
-/// the local mean, so that it ends with 1 + L times the contrast before the reduction. The local strength of detail,
-/// A² = ⟨d²⟩ over a few samples of the band, decides: against the noise s² of the band n = A⁴ / (A⁴ + (2 s)⁴) leaves noise as it is,
-/// e = 1 / (1 + (D A / edge)⁴) leaves strong edges and what they drag along without halo, and b′ = 1 / (1 + (b / size)²) leaves large
-/// areas to the window. `sigma` is the standard error of every pixel of the reduced image; noise is taken to be white.
+/// A detail d in a band of size b becomes d (1 + (D (1 + L) − 1) n e b′) with L the share `detail` and D the divisor of the latitude
+/// reduction at the local mean, so that it ends with 1 + L times the contrast before the reduction. The local strength of detail,
+/// A² = ⟨d²⟩ over a few samples of the band, determines the factors: with the noise s² of the band, n = A⁴ / (A⁴ + (2 s)⁴) keeps noise
+/// unchanged, e = 1 / (1 + (D A / edge)⁴) keeps strong edges and their surroundings without halo, and b′ = 1 / (1 + (b / size)²) leaves
+/// large areas to the window. `sigma` is the standard error of every pixel of the reduced image; noise is assumed to be white.
 pub(crate) fn lifted(image: &Plane, sigma: &[f32], lift: &Lift) -> Vec<f32> {
     let shorter = image.columns.min(image.rows);
-    // Bands larger than the image, or so coarse that they hardly get a lift, are left alone.
+    // Bands larger than the image, or so coarse that they hardly get a lift, are unchanged.
     let coarsest = lift.size_px.max(1.0).log2().ceil() as u32 + 3;
     let bands = shorter.max(1).ilog2().min(coarsest) as usize;
     let noise = white_noise_of_bands(bands);
@@ -61,7 +61,7 @@ pub(crate) fn lifted(image: &Plane, sigma: &[f32], lift: &Lift) -> Vec<f32> {
             let divisor = lift.reduction.divisor(f64::from(smooth)) as f32;
             let most = fineness * (divisor * full - 1.0);
             let noise = core * variance;
-            // The smallest number keeps 0 / 0 out where neither detail nor noise is.
+            // The smallest number prevents 0 / 0 where there is neither detail nor noise.
             let significant =
                 strength * strength / (strength * strength + noise * noise + f32::MIN_POSITIVE);
             *value *= 1.0
@@ -101,7 +101,7 @@ mod tests {
 
     use super::*;
 
-    /// That of the default presentation on pixels of 0.5 mm.
+    /// The lift of the default presentation on pixels of 0.5 mm.
     const LIFT: Lift = Lift {
         reduction: LatitudeReduction(0.5),
         detail: 1.5,
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// What the presentation makes of a log exposure with a standard error.
+    /// Applies the presentation to a log exposure with a standard error.
     fn enhance(image: &Plane, sigma: f32) -> Vec<f32> {
         let values: Vec<f32> = image.values.iter().map(|&a| reduced(a)).collect();
         let divisor = |&t: &f32| LIFT.reduction.divisor(f64::from(t)) as f32;
@@ -144,8 +144,8 @@ mod tests {
         (squares.sum::<f64>() / n).sqrt()
     }
 
-    /// Noise of an even region grows by less than half of what the reduction leaves, and stays below 1.2 times what it was. Detail of the same
-    /// width gets at least 1.8 times its contrast. 65 000 pixels: standard error below 1 %.
+    /// Noise of an even region grows by less than half of what the reduction leaves, and stays below 1.2 times its original value. Detail
+    /// of the same width gets at least 1.8 times its contrast. 65 000 pixels: standard error below 1 %.
     #[test]
     fn noise_of_even_regions_stays() {
         for (level, sigma) in [(0.0, 0.005_f32), (2.0, 0.005), (2.0, 0.05), (4.5, 0.05)] {
@@ -159,12 +159,12 @@ mod tests {
             let growth = shown / width(&left);
             assert!((1.0..1.5).contains(&growth), "{level}: {growth}");
             assert!(shown < 1.2 * width(&noisy.values), "{level}");
-            // The same detail, had it been no noise, is lifted.
+            // The same detail is lifted if it is not noise.
             assert!(width(&enhance(&noisy, 0.0)) > 1.8 * width(&noisy.values));
         }
     }
 
-    /// A joint space: a gap 3 mm wide with 0.15 less log exposure gets twice its contrast before the reduction, in front of thin and thick parts.
+    /// A joint space: a gap 3 mm wide with 0.15 less log exposure gets twice its original contrast, in front of thin and thick parts.
     #[test]
     fn a_joint_space_is_lifted() {
         for level in [2.0, 4.0] {
@@ -181,8 +181,8 @@ mod tests {
         }
     }
 
-    /// Overshoot beside an edge as a share of the reduced step: of a metal plate in air and on bone, of skin, and of bone in soft tissue, whose
-    /// overshoot is still less than half of the step before the reduction.
+    /// Overshoot next to an edge as a share of the reduced step: of a metal plate in air and on bone, of skin, and of bone in soft
+    /// tissue, whose overshoot is still less than half of the step before the reduction.
     #[test]
     fn strong_edges_get_no_halo() {
         for (level, step, blur_px, most) in [
@@ -204,7 +204,7 @@ mod tests {
         }
     }
 
-    /// Large areas are as the reduction leaves them, so that more exposure is always darker there.
+    /// Large areas stay as reduced, so that more exposure is always darker there.
     #[test]
     fn large_areas_keep_their_value_and_order() {
         let stairs = image(800, 120, |x, _| 0.8 * (x / 160.0).floor());

@@ -11,22 +11,22 @@ use crate::image::radiograph::Radiograph;
 /// Exposure index of 1 µGy under the calibration beam (IEC 62494-1:2008).
 const INDEX_PER_UGY: f64 = 100.0;
 
-/// Pixels below this share of the open field belong to the limb: 1 cm of soft tissue at 60 kVp lets 0.8 pass.
+/// Pixels below this share of the open field belong to the limb: 1 cm of soft tissue at 60 kVp transmits 0.8.
 const LIMB_BELOW: f64 = 0.8;
 
-/// Smallest part of the field that counts as a limb; less is noise.
+/// Smallest share of the field that counts as a limb; anything less is noise.
 const LEAST_LIMB: f64 = 0.01;
 
 impl Radiograph {
     /// Exposure index EI = 100 K, where K in µGy is the air kerma of the calibration beam RQA5 that gives the value of interest
-    /// on the receptor (IEC 62494-1:2008). `None` for the expected image, which stands for no exposure, and where nothing is read.
+    /// on the receptor (IEC 62494-1:2008). `None` for the expected image, which has no exposure, and if nothing is read.
     ///
     /// The value of interest is the median reading over the relevant image region: pixels in the collimated field that read less
-    /// than 0.8 of the open field, or the whole field if these are fewer than 1 % of it. A grid is no part of the calibration:
-    /// it acts on the image alone.
+    /// than 0.8 of the open field, or the whole field if these are fewer than 1 % of it. The calibration is without a grid,
+    /// which affects only the image.
     ///
     /// # Errors
-    /// [`ReceptorError`] for a receptor that makes no sense.
+    /// [`ReceptorError`] for an invalid receptor.
     pub fn exposure_index(&self, receptor: &Receptor) -> Result<Option<f64>, ReceptorError> {
         let per_history = self.exposure_index_per_history(receptor)?;
         Ok(per_history
@@ -34,7 +34,7 @@ impl Radiograph {
             .filter(|index| index.is_finite()))
     }
 
-    /// Exposure index of one history; `None` where nothing is read.
+    /// Exposure index of one history; `None` if nothing is read.
     pub(crate) fn exposure_index_per_history(
         &self,
         receptor: &Receptor,
@@ -87,7 +87,7 @@ fn signal_ev_cm2_per_ugy(receptor: &Receptor) -> Result<f64, ReceptorError> {
     Ok(signal_ev / (1e6 * beam.kerma_gy_cm2()))
 }
 
-/// The radiation quality RQA5 of IEC 61267:2005: 70 kV, 21 mm of aluminium added to a tube of 2.5 mm.
+/// The radiation quality RQA5 of IEC 61267:2005: 70 kV, with 21 mm of aluminium added to a tube filtered by 2.5 mm.
 fn rqa5() -> Spectrum {
     let tube = TubeSpec {
         kvp: 70.0,
@@ -101,7 +101,7 @@ fn rqa5() -> Spectrum {
 mod tests {
     use super::*;
 
-    /// IEC 61267 demands 6.8 mm Al; IEC 62220-1 states 30 174 photons per mm² and µGy.
+    /// IEC 61267 requires 6.8 mm Al; IEC 62220-1 states 30 174 photons per mm² and µGy.
     #[test]
     fn rqa5_has_the_half_value_layer_and_fluence_of_iec() {
         let beam = rqa5();

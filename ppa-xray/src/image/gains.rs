@@ -4,9 +4,10 @@ use crate::detector::gains::Gains;
 use crate::image::radiograph::Radiograph;
 
 impl Radiograph {
-    /// Multiplies the photon layers and their standard errors by the gains of the pixels; the sums over the image stay those of the arriving energy.
+    /// Multiplies the photon layers and their standard errors by the gains of the pixels; the sums over the image stay those of the
+    /// arriving energy.
     ///
-    /// Electronic noise arises behind the pixels and is added later.
+    /// Electronic noise arises after the pixels and is added later.
     #[must_use]
     pub(crate) fn with_gains(mut self, gains: &Gains) -> Self {
         for layer in &mut self.layers {

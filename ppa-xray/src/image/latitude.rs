@@ -1,6 +1,6 @@
-//! Latitude reduction: the range of log exposure of large areas, brought to what a picture can show.
+//! Latitude reduction: reduces the range of log exposure of large areas to what can be displayed.
 
-/// Divides contrast by 1 + r |a| at log exposure a, with r the number held: t = sign(a) ln(1 + r |a|) / r, and t = a for r = 0.
+/// Divides contrast by 1 + r |a| at log exposure a, where r is the field: t = sign(a) ln(1 + r |a|) / r, and t = a for r = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LatitudeReduction(pub f64);
 
@@ -13,7 +13,7 @@ impl LatitudeReduction {
         ((self.0 * log_exposure.abs()).ln_1p() / self.0).copysign(log_exposure)
     }
 
-    /// Log exposure from what [`LatitudeReduction::reduced`] made of it.
+    /// Log exposure before the reduction; the inverse of [`LatitudeReduction::reduced`].
     pub fn restored(self, reduced: f64) -> f64 {
         if self.0 == 0.0 {
             return reduced;
@@ -21,7 +21,7 @@ impl LatitudeReduction {
         ((self.0 * reduced.abs()).exp_m1() / self.0).copysign(reduced)
     }
 
-    /// By what contrast is divided where the reduced log exposure is this: 1 + r |a| = exp(r |t|).
+    /// Divisor of the contrast at the given reduced log exposure: 1 + r |a| = exp(r |t|).
     pub fn divisor(self, reduced: f64) -> f64 {
         (self.0 * reduced.abs()).exp()
     }

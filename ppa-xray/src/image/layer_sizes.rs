@@ -1,4 +1,4 @@
-//! Layers are public: writers check that each still has a value per pixel.
+//! Check that each layer has one value per pixel. Layers are public, so writers need it.
 
 use crate::image::presentation::PresentationError;
 use crate::image::radiograph::Radiograph;
@@ -6,7 +6,7 @@ use crate::transport::tally::Category;
 
 impl Radiograph {
     /// # Errors
-    /// [`PresentationError::Pixels`] where a layer does not have one value and one standard error per pixel.
+    /// [`PresentationError::Pixels`] if a layer does not have one value and one standard error per pixel.
     pub(crate) fn check_layers(&self) -> Result<(), PresentationError> {
         let expected = self.detector.pixels();
         let names = Category::ALL.map(Category::name).into_iter();

@@ -1,21 +1,21 @@
-//! The radiograph as log exposure over the bare field, with latitude reduced and detail lifted, and as grey values.
+//! The radiograph as log exposure relative to the bare field, with reduced latitude and lifted detail, and as grey values.
 
 use crate::image::enhancement::{Lift, lifted};
 use crate::image::presentation::{Presentation, PresentationError};
 use crate::image::pyramid::Plane;
 use crate::image::radiograph::Radiograph;
 
-/// Readings below this share of the bare field count as this share, so that empty pixels stay finite.
+/// Lower limit of readings as a share of the bare field, which keeps empty pixels finite.
 const DARKEST: f64 = 1e-5;
 
-/// Standard error of the log exposure of a pixel that nothing reached.
+/// Standard error of the log exposure of a pixel without hits.
 const EMPTY_SIGMA: f64 = 1.0;
 
 impl Radiograph {
     /// Grey values 0 (black, bare field) to 65535 (white), row-major.
     ///
     /// # Errors
-    /// [`PresentationError`] when a parameter is out of range, or a layer does not have a value per pixel.
+    /// [`PresentationError`] if a parameter is out of range, or if a layer does not have a value per pixel.
     pub fn present(&self, presentation: &Presentation) -> Result<Vec<u16>, PresentationError> {
         let enhanced = self.enhanced_log_exposure(presentation)?;
         let grey = presentation.grey();
@@ -32,7 +32,7 @@ impl Radiograph {
             .collect())
     }
 
-    /// Log exposure after latitude reduction with its detail lifted, before the window; that of the bare field outside the field.
+    /// Log exposure after latitude reduction and lifting of detail, before the window; outside the field, that of the bare field.
     pub(crate) fn enhanced_log_exposure(
         &self,
         presentation: &Presentation,

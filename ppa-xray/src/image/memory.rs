@@ -3,15 +3,15 @@
 use crate::beam::detector::Detector;
 use crate::beam::projection_error::ProjectionError;
 
-/// Bytes per pixel at the height of the work of either engine: sums or moments of four categories, noise, and the planes of
+/// Peak number of bytes per pixel in either engine: sums or moments of four categories, noise, and the planes of
 /// the result.
 const BYTES_PER_PIXEL: usize = 256;
 
 /// # Errors
-/// [`ProjectionError::Memory`] if the operating system would not lend what the image of a detector takes.
+/// [`ProjectionError::Memory`] if the operating system cannot allocate the memory for the image of a detector.
 pub(crate) fn check(detector: &Detector) -> Result<(), ProjectionError> {
     let bytes = detector.pixels().saturating_mul(BYTES_PER_PIXEL);
-    // Nothing is written, so no memory is taken.
+    // Nothing is written, so no memory is used.
     let lent = Vec::<u8>::new().try_reserve_exact(bytes);
     lent.map_err(|_| ProjectionError::Memory {
         columns: detector.columns,
@@ -24,7 +24,7 @@ pub(crate) fn check(detector: &Detector) -> Result<(), ProjectionError> {
 mod tests {
     use super::*;
 
-    /// 2⁶⁴ pixels fit nowhere.
+    /// 2⁶⁴ pixels never fit into memory.
     #[test]
     fn an_image_that_fits_nowhere_is_refused() {
         let huge = Detector::centred(u32::MAX, u32::MAX, 1e-6);

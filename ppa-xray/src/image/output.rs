@@ -1,4 +1,4 @@
-//! Radiographs as files: 16-bit PNG to look at, EXR with every layer to compute with.
+//! Image files of radiographs: 16-bit PNG for viewing, EXR with every layer for computing.
 
 use std::{
     io::Cursor,
@@ -17,12 +17,12 @@ use crate::transport::tally::Category;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// The file system said no.
+    /// The file could not be written.
     #[error("cannot write {}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file system.
         source: std::io::Error,
     },
     /// The PNG encoder failed.
@@ -30,7 +30,7 @@ pub enum OutputError {
     Png {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the encoder.
         source: image::ImageError,
     },
     /// The EXR encoder failed.
@@ -38,7 +38,7 @@ pub enum OutputError {
     Exr {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the encoder.
         source: exr::Error,
     },
     /// The DICOM encoder failed.
@@ -47,10 +47,10 @@ pub enum OutputError {
     Dicom {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the encoder.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// More pixels than DICOM can say.
+    /// The image has more pixels than DICOM can represent.
     #[cfg(feature = "dicom")]
     #[error("a DICOM image has at most 65535 columns and rows, this one has {columns} x {rows}")]
     DicomSize {
@@ -59,22 +59,22 @@ pub enum OutputError {
         /// Rows of the image.
         rows: u32,
     },
-    /// The receptor makes no sense.
+    /// The receptor is invalid.
     #[cfg(feature = "dicom")]
     #[error(transparent)]
     Receptor(#[from] crate::beam::receptor::ReceptorError),
-    /// The presentation is not usable.
+    /// The presentation is invalid.
     #[error(transparent)]
     Presentation(#[from] PresentationError),
 }
 
-/// Name of the one EXR attribute that carries what is not pixels, as `key = value` lines (TOML).
+/// Name of the EXR attribute that holds the metadata, as `key = value` lines (TOML).
 ///
-/// One only: the encoder keeps further attributes in a hash map, whose order changes from run to run.
+/// There is only one: the encoder keeps further attributes in a hash map, whose order changes from run to run.
 pub const EXR_ATTRIBUTE: &str = "ppaXray";
 
 impl Radiograph {
-    /// Writes the presentation image as 16-bit grey PNG; the file appears whole or not at all.
+    /// Writes the presentation image as 16-bit grey PNG. The file is written completely or not at all.
     ///
     /// # Errors
     /// [`OutputError`] naming the file.
@@ -96,12 +96,12 @@ impl Radiograph {
         write_whole(path, &encoded)
     }
 
-    /// Writes all layers as 32-bit EXR; the file appears whole or not at all.
+    /// Writes all layers as 32-bit EXR. The file is written completely or not at all.
     ///
     /// Channels: `Y`, the total, and per [`Category`] `<name>.value` and `<name>.sigma`, eV/cm² per history; with electronic
     /// noise `electronic.value` and `electronic.sigma`.
-    /// The attribute [`EXR_ATTRIBUTE`] holds seed, histories, units, geometry and exposure. The bytes depend on
-    /// nothing but the radiograph.
+    /// The attribute [`EXR_ATTRIBUTE`] holds seed, histories, units, geometry and exposure. The bytes depend only on the
+    /// radiograph.
     ///
     /// # Errors
     /// [`OutputError`] naming the file.
@@ -170,7 +170,7 @@ impl Radiograph {
     }
 }
 
-/// [`whole_file::write`] with the error of this crate.
+/// Calls [`whole_file::write`] and converts its error.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     whole_file::write(path, bytes).map_err(|source| OutputError::Write {
         path: path.into(),

@@ -1,4 +1,4 @@
-//! From detector energy to the grey values of a clinical radiograph: bone white, air black.
+//! Conversion of detector energy to the grey values of a clinical radiograph: bone white, air black.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,48 +12,48 @@ pub enum PresentationError {
     /// A parameter is out of range.
     #[error("the presentation's {what} is {found}, expected {expected}")]
     Parameter {
-        /// Which parameter.
+        /// Name of the parameter.
         what: &'static str,
-        /// What it was.
+        /// Value found.
         found: f64,
-        /// What it may be.
+        /// Allowed range.
         expected: &'static str,
     },
-    /// No protocol has that name.
+    /// No protocol has the given name.
     #[error("no presentation is named {found:?}; known presentations are {}", known.join(", "))]
     Protocol {
-        /// The name given.
+        /// Name given.
         found: String,
-        /// The names there are.
+        /// Names of all protocols.
         known: Vec<&'static str>,
     },
-    /// A layer was cut or extended.
+    /// A layer has more or fewer pixels than the detector.
     #[error("layer {layer} has {found} values, expected {expected}, one per pixel")]
     Pixels {
         /// Name of the layer.
         layer: &'static str,
-        /// Values or standard errors it has.
+        /// Number of values or standard errors in the layer.
         found: usize,
         /// Pixels of the detector.
         expected: usize,
     },
 }
 
-/// Fixed mapping of a radiograph to grey values; never adapted to the single image.
+/// Fixed mapping of a radiograph to grey values, never adapted to a single image.
 ///
-/// A pixel's log exposure is compared with the bare field, a = ln(open / reading), which for the primary alone is
-/// the line integral of the attenuation. From skin to hindfoot it covers more than a picture can show with the contrast of a joint space. As in
-/// clinical multi-scale processing (Vuylsteke and Schoeters, Proc. SPIE 2167 (1994) 551; Stahl, Aach and Dippel, Med. Phys. 27 (2000) 56), large areas
-/// and fine detail are therefore treated apart:
+/// A pixel's log exposure is relative to the bare field, a = ln(open / reading), which for the primary alone is
+/// the line integral of the attenuation. Its range from skin to hindfoot is too large to display with the contrast of a joint space. As in
+/// clinical multi-scale processing (Vuylsteke and Schoeters, Proc. SPIE 2167 (1994) 551; Stahl, Aach and Dippel, Med. Phys. 27
+/// (2000) 56), large areas and fine detail are therefore treated separately:
 ///
-/// 1. Latitude reduction: a becomes t = ln(1 + r a) / r, which divides contrast by 1 + r a. Bare field stays 0, and more
-///    attenuation always gives more.
-/// 2. In the bands of a Laplacian pyramid of t, faint detail that stands out of the noise gets back what step 1 took, and the share `detail` on top.
-///    The noise is known from the standard errors of the radiograph. Large areas and strong edges stay as reduced.
+/// 1. Latitude reduction: a becomes t = ln(1 + r a) / r, which divides contrast by 1 + r a. The bare field stays 0, and t increases
+///    monotonically with attenuation.
+/// 2. In the bands of a Laplacian pyramid of t, faint detail above the noise regains the contrast lost in step 1, and is increased by the
+///    share `detail`. The noise is known from the standard errors of the radiograph. Large areas and strong edges stay as reduced.
 /// 3. A sigmoid window (DICOM PS3.3 C.11.2.1.3.1) over the t of its ends turns t into grey: 1 / (1 + exp(−4 (t − middle) / (high − low))),
 ///    stretched so that the bare field is black. Pixels outside the field are black.
 ///
-/// In a file it is a table of these numbers, or a name and what differs from it: `{ protocol = "ankle_lateral", width = 4.5 }`.
+/// In a file it is a table of these numbers, or a protocol and the values that differ: `{ protocol = "ankle_lateral", width = 4.5 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "PresentationTable")]
 #[non_exhaustive]
@@ -83,7 +83,7 @@ const LIMB: Presentation = Presentation {
     edge: 0.12,
 };
 
-/// Fixed presentations by name. From the front the hindfoot is thicker than from the side.
+/// Fixed presentations by name. The hindfoot is thicker from the front than from the side.
 const PROTOCOLS: &[(&str, Presentation)] = &[
     ("limb", LIMB),
     (
@@ -112,7 +112,7 @@ const PROTOCOLS: &[(&str, Presentation)] = &[
     ),
 ];
 
-/// A presentation as it stands in a file: a protocol, and what differs from it.
+/// A presentation as written in a file: a protocol, and the values that differ from it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PresentationTable {
@@ -157,10 +157,10 @@ impl Default for Presentation {
     }
 }
 
-/// Log exposure from which a pixel counts as covered when a window is fitted.
+/// Log exposure above which a pixel counts as covered when a window is fitted.
 const COVERED: f64 = 0.1;
 
-/// Share of the covered pixels that a fitted window leaves at either end.
+/// Share of the covered pixels that a fitted window cuts off at either end.
 const TAIL: f64 = 0.02;
 
 impl Presentation {
@@ -172,7 +172,7 @@ impl Presentation {
     /// A fixed presentation by name.
     ///
     /// # Errors
-    /// [`PresentationError::Protocol`] with the names there are.
+    /// [`PresentationError::Protocol`] with the names of all protocols.
     pub fn protocol(name: &str) -> Result<Self, PresentationError> {
         let found = PROTOCOLS.iter().find(|(known, _)| *known == name);
         found
@@ -183,11 +183,11 @@ impl Presentation {
             })
     }
 
-    /// The same presentation with a window that fits one image, for a look at something unknown: images that are to be
-    /// compared, or learnt from, want a fixed one. From the 2nd to the 98th percentile of what is not bare field.
+    /// The same presentation with a window fitted to one image, for viewing unknown images: from the 2nd to the 98th percentile of the
+    /// covered pixels. Use a fixed window for images that are to be compared or used for training.
     ///
     /// # Errors
-    /// [`PresentationError`] when a parameter is out of range, or when the image is bare or even, so that no window fits it.
+    /// [`PresentationError`] if a parameter is out of range, or if the image is bare or uniform, so that no window fits it.
     pub fn fitted(&self, radiograph: &Radiograph) -> Result<Self, PresentationError> {
         let reduction = self.reduction();
         let mut covered = radiograph.enhanced_log_exposure(self)?;
@@ -253,7 +253,7 @@ impl Presentation {
         LatitudeReduction(self.latitude_reduction)
     }
 
-    /// The grey, 0 (black, bare field) to 1 (white), of a log exposure after latitude reduction.
+    /// Grey value, 0 (black, bare field) to 1 (white), of a log exposure after latitude reduction.
     pub(super) fn grey(&self) -> impl Fn(f64) -> f64 {
         let reduction = self.reduction();
         let [low, high] = [-0.5, 0.5].map(|end| reduction.reduced(self.centre + end * self.width));
@@ -291,7 +291,7 @@ mod tests {
         }
     }
 
-    /// A file from before the latitude reduction.
+    /// A file written before the latitude reduction was introduced.
     #[test]
     fn a_file_without_latitude_reduction_takes_the_default() {
         let old = "centre = 2.4\nwidth = 4.0\ndetail = 2.0\ndetail_mm = 8.0\nedge = 0.12";
@@ -300,7 +300,7 @@ mod tests {
         assert_eq!((read.centre, read.width), (2.4, 4.0));
     }
 
-    /// A rim of soft tissue, log exposure 0.25, and the hindfoot from the front, log exposure 5, lie between black and white.
+    /// A rim of soft tissue, log exposure 0.25, and the hindfoot from the front, log exposure 5, are between black and white.
     #[test]
     fn skin_and_hindfoot_are_grey_in_every_protocol() {
         for (name, presentation) in PROTOCOLS {

@@ -12,7 +12,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// Half as many columns and rows, smoothed first; the border is continued outwards.
+    /// Halves columns and rows after smoothing; the border is continued outwards.
     pub fn halved(&self) -> Self {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
         let mut narrow = vec![0.0; columns * self.rows];
@@ -49,7 +49,7 @@ impl Plane {
         }
     }
 
-    /// Back to the size it was halved from, interpolated.
+    /// Interpolates back to the size before halving.
     pub fn doubled(&self, columns: usize, rows: usize) -> Self {
         let mut wide = vec![0.0; columns * self.rows];
         for (source, target) in self
@@ -78,7 +78,7 @@ impl Plane {
     }
 }
 
-/// Index of tap `i − 2`, kept inside.
+/// Index of tap `i − 2`, clamped to the image.
 fn clamped(i: usize, length: usize) -> usize {
     i.saturating_sub(2).min(length - 1)
 }
@@ -89,7 +89,7 @@ fn neighbours(fine: usize, length: usize) -> [usize; 3] {
     [at.saturating_sub(1), at, (at + 1).min(length - 1)]
 }
 
-/// The filter, twice as high, on samples with zeros in between.
+/// Applies the filter, scaled by two, to samples with zeros in between.
 fn between(fine: usize, before: f32, at: f32, after: f32) -> f32 {
     if fine.is_multiple_of(2) {
         2.0 * (FILTER[0] * (before + after) + FILTER[2] * at)
@@ -98,10 +98,10 @@ fn between(fine: usize, before: f32, at: f32, after: f32) -> f32 {
     }
 }
 
-/// Standard deviation that each band of detail has in the mean when the image is white noise of unit variance.
+/// Mean standard deviation of each band of detail when the image is white noise of unit variance.
 ///
 /// With the one-dimensional responses g of a sample of the band's image and e of its smoothed copy, the band's variance is
-/// Σ (gg − ee)² = (g·g)² − 2 (g·e)² + (e·e)², in the mean over the positions of e between the halved samples.
+/// Σ (gg − ee)² = (g·g)² − 2 (g·e)² + (e·e)², averaged over the positions of e between the halved samples.
 pub(crate) fn white_noise_of_bands(bands: usize) -> Vec<f64> {
     let filter = FILTER.map(f64::from);
     let mut response = vec![1.0];
@@ -129,7 +129,7 @@ pub(crate) fn white_noise_of_bands(bands: usize) -> Vec<f64> {
         let from = -(response.len() as i64 - 1) / 2;
         let halved_from = from - 2 * step as i64;
         let even_from = halved_from - 2 * step as i64;
-        // An odd sample lies one step after the halved sample before it.
+        // An odd sample is one step after the halved sample before it.
         let odd_from = halved_from - step as i64;
         let own = dot(&response, 0, &response, 0);
         let cross =
@@ -179,7 +179,7 @@ mod tests {
         }
     }
 
-    /// A slope in either direction survives halving and doubling away from the border.
+    /// A slope in either direction is preserved by halving and doubling away from the border.
     #[test]
     fn a_slope_comes_back() {
         let (columns, rows) = (40, 30);
@@ -200,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Noise of the bands of 512 × 512 random pixels against the formula. Band 4 holds 1024 correlated samples, so that its standard
+    /// Noise of the bands of 512 × 512 random pixels against the formula. Band 4 has 1024 correlated samples, so its standard
     /// error is about 3 %: bounds of 4 standard errors.
     #[test]
     fn bands_of_white_noise_have_the_stated_width() {

@@ -1,4 +1,4 @@
-//! The result of both engines: energy per pixel by category, with standard errors.
+//! Result of both engines: energy per pixel by category, with standard errors.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,8 +20,8 @@ pub enum Engine {
 
 /// Energy on the whole detector by category, eV per history, each with its standard error.
 ///
-/// The fast engine finds all scatter from the same collisions: the error of a sum of categories is larger than that of
-/// independent ones, up to the sum of their errors.
+/// The fast engine computes all scatter from the same collisions: the error of a sum of categories is larger than for
+/// independent categories, up to the sum of their errors.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct CategorySums {
@@ -88,30 +88,30 @@ impl CategorySums {
     }
 }
 
-/// Energy that photons leave in the detector, split by what happened to them on their way.
+/// Energy that photons deposit in the detector, split by their interactions on the way.
 ///
-/// Pixel (column, row) stands at `row * columns + column`; columns run along device x, rows along
-/// device y. Values are eV/cm² per history, the unit of MC-GPU: summed over the pixels and
-/// multiplied by the pixel area they give eV per history.
+/// Pixel (column, row) has the index `row * columns + column`; columns run along device x, rows along
+/// device y. Values are eV/cm² per history, the unit of MC-GPU. Their sum over the pixels times
+/// the pixel area is in eV per history.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Radiograph {
-    /// Pixels and their size.
+    /// Number, size and position of the pixels.
     pub detector: Detector,
-    /// Which engine made it.
+    /// Engine that computed the radiograph.
     pub engine: Engine,
-    /// Histories that the noise of the image stands for; infinite for the expected image.
+    /// Histories that the noise of the image represents; infinite for the expected image.
     pub histories: f64,
-    /// Photons that the tube emits into the field per mAs, if the spectrum knows its fluence: everything that is per
-    /// history becomes per mAs when multiplied by it.
+    /// Photons that the tube emits into the field per mAs, if the spectrum has a fluence. Multiply values per
+    /// history by it to get values per mAs.
     pub histories_per_mas: Option<f64>,
-    /// Seed it was made from.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// Source-detector distance, mm.
     pub source_detector_mm: f64,
-    /// What the centre of the detector would read with nothing in the beam, eV/cm² per history.
+    /// Reading of the centre of the detector with nothing in the beam, eV/cm² per history.
     pub open_field_ev_cm2: f64,
-    /// That reading over the detector.
+    /// The same reading over the detector.
     pub(crate) open_field: OpenField,
     /// The layers, in the order of [`Category::ALL`].
     pub layers: [Layer; 4],
@@ -120,11 +120,11 @@ pub struct Radiograph {
     pub(crate) single_scatter_covariance: Vec<f32>,
     /// Electronic noise of the detector, if it has any: mean 0, the same standard deviation in every pixel.
     pub electronic: Option<Layer>,
-    /// Energy on the whole detector. For the fast engine: before quantum noise is added, so that
+    /// Energy on the whole detector. For the fast engine, it is taken before quantum noise is added, so
     /// the primary has no standard error.
     pub sums: CategorySums,
-    /// Fast engine: the largest share that a single path of a photon has in the scatter of a point of the detector.
-    /// Small is good: many paths agree. None for the analog engine, whose photons all count the same.
+    /// Fast engine: the largest share of a single photon path in the scatter at a point of the detector.
+    /// A small share is good: many paths contribute. `None` for the analog engine, where all photons have the same weight.
     pub largest_score_share: Option<f64>,
 }
 
@@ -139,17 +139,17 @@ impl Radiograph {
         self.detector.rows as usize
     }
 
-    /// The plane of one category.
+    /// The layer of one category.
     pub fn layer(&self, category: Category) -> &Layer {
         &self.layers[category as usize]
     }
 
-    /// All layers, electronic noise among them.
+    /// All layers, including electronic noise.
     pub(super) fn planes(&self) -> impl Iterator<Item = &Layer> {
         self.layers.iter().chain(&self.electronic)
     }
 
-    /// The reading of every pixel: all layers together, eV/cm² per history; not a number where a layer lacks the pixel.
+    /// Reading of every pixel, the sum of all layers, eV/cm² per history; NaN where a layer lacks the pixel.
     pub fn total(&self) -> Vec<f32> {
         self.per_pixel(|pixel| {
             self.planes()
@@ -165,8 +165,8 @@ impl Radiograph {
 
     /// Standard error of [`Radiograph::total`].
     ///
-    /// The fast engine finds all scatter from the same collisions. What the errors of Compton and Rayleigh scatter share is
-    /// counted; multiple scatter is taken as independent of both, which is right to 5 % of the error. Not a number where a layer
+    /// The fast engine computes all scatter from the same collisions. The covariance of Compton and Rayleigh scatter is
+    /// included; multiple scatter is treated as independent of both, which is correct to 5 % of the error. NaN where a layer
     /// lacks the pixel.
     pub fn sigma(&self) -> Vec<f32> {
         self.per_pixel(|pixel| {
@@ -187,18 +187,18 @@ impl Radiograph {
         })
     }
 
-    /// Tube load whose quantum noise the image carries, mAs.
+    /// Tube load that corresponds to the quantum noise of the image, mAs.
     pub fn mas(&self) -> Option<f64> {
         Some(self.histories / self.histories_per_mas?)
     }
 
-    /// Reading of a pixel with nothing in the beam and the collimator wide open, eV/cm² per history.
+    /// Reading of a pixel with nothing in the beam and the collimator fully open, eV/cm² per history.
     pub fn open_field_at(&self, pixel: usize) -> f64 {
         let at = self.detector.pixel_centre_mm(pixel);
         self.open_field_ev_cm2 * self.open_field.at(at)
     }
 
-    /// Whether the whole pixel lies in the field that the collimator leaves open.
+    /// Whether the entire pixel is in the field of the collimator.
     pub fn in_field(&self, pixel: usize) -> bool {
         let at = self.detector.pixel_centre_mm(pixel);
         self.open_field.exposes(at, self.detector.pixel_mm)

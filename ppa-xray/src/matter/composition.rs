@@ -11,7 +11,7 @@ use crate::matter::material_error::MaterialError;
 pub(crate) struct Composition(Vec<(u8, f64)>);
 
 impl Composition {
-    /// Checked, sorted and normalised; `name` is that of the material, for errors.
+    /// Checks, sorts and normalises mass fractions; `name` is that of the material, for errors.
     pub fn new(name: &str, mass_fractions: &[(u8, f64)]) -> Result<Self, MaterialError> {
         let name = || name.to_owned();
         let mut sorted = Vec::with_capacity(mass_fractions.len());
@@ -53,7 +53,7 @@ impl Composition {
         Ok(Self(sorted))
     }
 
-    /// From text such as `Ca:0.4,O:0.6`: symbols and mass fractions.
+    /// Parses text such as `Ca:0.4,O:0.6`: symbols and mass fractions.
     pub fn parse(name: &str, text: &str) -> Result<Self, MaterialError> {
         let mass_fractions = text
             .split(',')
@@ -69,7 +69,7 @@ impl Composition {
         Self::new(name, &mass_fractions)
     }
 
-    /// As [`Composition::parse`] reads it.
+    /// The text that [`Composition::parse`] reads.
     pub fn text(&self) -> String {
         let parts = self.0.iter().map(|&(z, fraction)| {
             let symbol = symbol(z).expect("Z checked on the way in");
@@ -98,7 +98,7 @@ impl Composition {
             })
     }
 
-    /// [`Composition::cross_sections`] at [`energy_nodes`](crate::matter::energy_nodes::energy_nodes).
+    /// Returns [`Composition::cross_sections`] at [`energy_nodes`](crate::matter::energy_nodes::energy_nodes).
     pub fn cross_sections_at_nodes(&self) -> Vec<CrossSections> {
         let mut sums = Vec::new();
         for (element, w) in self.elements() {
@@ -125,7 +125,7 @@ impl Composition {
             .sum()
     }
 
-    /// Electron shells; their electrons per unit mass, up to a constant.
+    /// Electron shells, with electrons per unit mass up to a constant.
     pub fn shells(&self) -> Vec<Shell> {
         self.elements()
             .flat_map(|(element, w)| {
@@ -170,7 +170,7 @@ mod tests {
     use crate::matter::material::Material;
 
     proptest::proptest! {
-        /// Every element at every energy: finite, positive, F(0) = Z, S from 0 to no more than Z.
+        /// Every element at every energy: finite, positive, F(0) = Z, S from 0 to at most Z.
         #[test]
         fn every_element_has_sound_tables(z in 1..=92_u8, energy_kev in 1.0..=150.0_f64) {
             let element = elements().get(z).unwrap();

@@ -9,7 +9,7 @@ use crate::{
     octaves::Octaves,
 };
 
-/// How photons scatter off electrons. Both take the total cross section of the data.
+/// Model of Compton scattering off electrons. Both models use the tabulated total cross section.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -40,7 +40,7 @@ impl Compton {
         }
     }
 
-    /// Energy in keV of a photon scattered by sin²(θ/2) = `sin2_half_theta`.
+    /// Samples the energy in keV of a photon scattered by sin²(θ/2) = `sin2_half_theta`.
     #[inline]
     pub(crate) fn sample_energy(
         &self,
@@ -56,7 +56,7 @@ impl Compton {
         }
     }
 
-    /// sin²(θ/2) and the energy of the scattered photon in keV.
+    /// Samples sin²(θ/2) and the energy of the scattered photon in keV.
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f32, uniform: impl FnMut() -> f32) -> (f32, f32) {
         match self {

@@ -1,14 +1,14 @@
-//! Cross sections of one material without logarithms.
+//! Cross sections of one material, evaluated without logarithms.
 
 use crate::matter::cross_sections::CrossSections;
 use crate::matter::energy_nodes::{PARTS, energy_bins};
 use crate::matter::material::Material;
 use crate::octaves::Octaves;
 
-/// Largest relative departure from a straight line in a bin; beyond it the material itself is to be asked.
+/// Largest relative deviation from a straight line in a bin; bins above it are evaluated from the material itself.
 const STRAIGHT: f64 = 5e-4;
 
-/// Mass attenuation by interaction over energy, in straight lines.
+/// Mass attenuation by interaction over energy, piecewise linear.
 #[derive(Clone, Debug)]
 pub(crate) struct CrossSectionTable {
     grid: Octaves,
@@ -25,7 +25,7 @@ struct Bin {
 
 impl Bin {
     /// Marks a bin in which the photoelectric part is not a straight line, because of an edge or the fine structure
-    /// below one: there the material itself is asked.
+    /// below one; there the material itself is evaluated.
     const CUT: f32 = f32::NAN;
 
     fn new(low: CrossSections, high: CrossSections) -> Self {
@@ -73,7 +73,7 @@ impl CrossSectionTable {
         Self { grid, bins }
     }
 
-    /// Nothing in a bin that is not a straight line; energies outside get the values at the nearer end.
+    /// Interpolated cross sections, or `None` in a bin that is not a straight line. Energies outside get the values at the nearer end.
     #[inline]
     pub fn at(&self, energy_kev: f64) -> Option<CrossSections> {
         let (index, fraction) = self.grid.locate(energy_kev);

@@ -1,4 +1,4 @@
-//! Cross sections of the elements, embedded: photoelectric, Rayleigh and Compton, F(q) and S(q), and their electron shells.
+//! Embedded cross sections of the elements: photoelectric, Rayleigh and Compton, F(q) and S(q), and their electron shells.
 //!
 //! Made by `scripts/make_cross_sections.py` from xraylib 4.3.0 (EPDL97); see `data/README.md`.
 
@@ -52,7 +52,7 @@ impl Add for CrossSections {
     }
 }
 
-/// Straight lines in log-log between nodes; a doubled abscissa is an edge, where the upper side counts.
+/// Log-log interpolation between nodes. A repeated abscissa is an edge, at which the upper side applies.
 #[derive(Debug, PartialEq)]
 pub(crate) struct LogLog {
     ln_x: Vec<f64>,
@@ -60,7 +60,7 @@ pub(crate) struct LogLog {
 }
 
 impl LogLog {
-    /// Stands for zero, which has no logarithm.
+    /// Replaces zero, which has no logarithm.
     const NOTHING: f64 = 1e-99;
 
     pub(crate) fn new(x: &[f64], y: &[f64]) -> Self {
@@ -80,7 +80,7 @@ impl LogLog {
         (y0 + (y1 - y0) * (ln_x - x0) / (x1 - x0)).exp()
     }
 
-    /// Abscissae that stand twice.
+    /// Abscissae that occur twice.
     pub(crate) fn edges(&self) -> impl Iterator<Item = f64> {
         self.ln_x
             .windows(2)
@@ -108,12 +108,12 @@ impl SectionTables {
     }
 }
 
-/// One element's tables.
+/// Tables of one element.
 pub(crate) struct Element {
     /// Atomic weight in g/mol.
     pub(crate) atomic_weight: f64,
     sections: SectionTables,
-    /// `sections` at [`energy_nodes`], once they were asked for.
+    /// `sections` at [`energy_nodes`], computed on first use.
     at_nodes: OnceLock<Vec<CrossSections>>,
     form_factor: Vec<f64>,
     incoherent: Vec<f64>,
@@ -127,7 +127,7 @@ impl Element {
         self.sections.at(energy_kev)
     }
 
-    /// [`Element::cross_sections`] at [`energy_nodes`], worked out once: all materials are sums of them.
+    /// [`Element::cross_sections`] at [`energy_nodes`], computed once: all materials are sums of them.
     pub(crate) fn cross_sections_at_nodes(&self) -> &[CrossSections] {
         self.at_nodes
             .get_or_init(|| energy_nodes().map(|e| self.cross_sections(e)).collect())
@@ -143,7 +143,7 @@ impl Element {
         &self.shells
     }
 
-    /// K fluorescence, if the K edge lies above 1 keV.
+    /// K fluorescence, if the K edge is above 1 keV.
     pub(crate) fn k_fluorescence(&self) -> Option<&KFluorescence> {
         self.k_fluorescence.as_ref()
     }
@@ -159,7 +159,7 @@ impl Element {
     }
 }
 
-/// Log-log between positive nodes, a straight line from q = 0 to the first of them.
+/// Interpolates log-log between positive nodes and linearly from q = 0 to the first of them.
 fn scattering_factor(nodes: &[f64], values: &[f64], q: f64) -> f64 {
     let upper = nodes
         .partition_point(|&node| node <= q)
@@ -173,7 +173,7 @@ fn scattering_factor(nodes: &[f64], values: &[f64], q: f64) -> f64 {
     }
 }
 
-/// All elements by atomic number less one, and the grid that F and S share.
+/// All elements by atomic number less one, and the common grid of F and S.
 pub(crate) struct Elements {
     q: Vec<f64>,
     by_z: Vec<Element>,
@@ -186,7 +186,7 @@ impl Elements {
     }
 }
 
-/// The embedded tables, unpacked once.
+/// Returns the embedded tables, unpacked once.
 pub(crate) fn elements() -> &'static Elements {
     static ELEMENTS: OnceLock<Elements> = OnceLock::new();
     ELEMENTS.get_or_init(|| {
@@ -227,9 +227,9 @@ pub(crate) fn elements() -> &'static Elements {
     })
 }
 
-/// Reader of an embedded, deflated table of little-endian numbers.
+/// Reads an embedded, deflated table of little-endian numbers.
 ///
-/// The tables are part of the program: a table that does not parse is a bug, and panics.
+/// The tables are part of the program: a table that does not parse is a bug and causes a panic.
 pub(crate) struct Unpacked {
     bytes: Vec<u8>,
     position: usize,

@@ -6,9 +6,9 @@ pub(crate) const ATOMIC_MOMENTA_PER_MC: f64 = 137.035_999_084;
 /// Electrons that share a binding energy and a Compton profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell {
-    /// Number of electrons, in whatever unit is common to the shells of a material.
+    /// Number of electrons, in any unit common to the shells of a material.
     pub electrons: f64,
-    /// Energy in keV that it takes to free one; 0 for conduction electrons.
+    /// Binding energy in keV; 0 for conduction electrons.
     pub binding_kev: f64,
     /// One-electron Compton profile J(0) in atomic units.
     pub profile_at_zero: f64,

@@ -2,7 +2,7 @@
 
 /// Symbol and density in g/cm³ at room conditions by atomic number less one, as in xraylib 4.3.0.
 ///
-/// At and Fr have no measured density; their numbers only stand in.
+/// At and Fr have no measured density; their numbers are placeholders.
 const ELEMENTS: [(&str, f64); 92] = [
     ("H", 8.4e-05),
     ("He", 0.000166),
@@ -103,7 +103,7 @@ pub(crate) fn symbol(z: u8) -> Option<&'static str> {
     Some(ELEMENTS.get(usize::from(z).checked_sub(1)?)?.0)
 }
 
-/// Atomic number of an element symbol, in any case.
+/// Atomic number of an element symbol, case-insensitive.
 pub(crate) fn atomic_number(text: &str) -> Option<u8> {
     let index = ELEMENTS
         .iter()

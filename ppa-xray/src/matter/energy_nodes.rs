@@ -3,10 +3,10 @@
 use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 use crate::octaves::Octaves;
 
-/// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.
+/// Bins per octave of energy, as a power of two; linear interpolation is then within 1e-4 of E⁻³ laws.
 const ENERGY_BITS: u32 = 8;
 
-/// Parts of a bin, as a power of two: cross sections between the nodes show whether a straight line does.
+/// Parts of a bin, as a power of two: cross sections between the nodes show whether linear interpolation is sufficient.
 const PART_BITS: u32 = 2;
 
 /// Parts of a bin.

@@ -15,10 +15,10 @@ impl Material {
         energy_kev * transfer.expect("photons lie inside the tables")
     }
 
-    /// Mass energy-transfer coefficient in cm²/g: what a photon field gives to electrons.
+    /// Mass energy-transfer coefficient in cm²/g: the energy that a photon field transfers to electrons.
     ///
-    /// Photoelectric part plus the Compton part times the mean fraction of energy that its electron gets
-    /// (Klein–Nishina × S(q)). Fluorescence counts as absorbed: right for air and tissue, too high for metals just above their edges.
+    /// Photoelectric part plus the Compton part times the mean fraction of energy transferred to the electron
+    /// (Klein–Nishina × S(q)). Fluorescence counts as absorbed: correct for air and tissue, too high for metals just above their edges.
     ///
     /// # Errors
     /// An energy outside 1 to 150 keV.

@@ -1,4 +1,4 @@
-//! K fluorescence: the photons that follow the absorption of a photon by a K shell.
+//! K fluorescence: the photons emitted after the absorption of a photon by a K shell.
 
 use crate::{
     matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
@@ -9,12 +9,12 @@ use crate::{
 /// Kα₁, Kα₂, Kβ₁ (from M shells), Kβ₂ (from N shells and beyond).
 const LINES: usize = 4;
 
-/// K fluorescence of an element, from xraylib's tables.
+/// K fluorescence of an element, from the tables of xraylib.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct KFluorescence {
     /// Energy of the K edge in keV.
     pub(crate) edge_kev: f64,
-    /// Share of the photoelectric absorption above the edge that the K shell does.
+    /// Share of the K shell in the photoelectric absorption above the edge.
     k_share: f64,
     /// Photons per K vacancy.
     fluorescence_yield: f64,
@@ -25,14 +25,14 @@ pub(crate) struct KFluorescence {
 /// A photon that may follow photoelectric absorption.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluorescenceLine {
-    /// Its energy in keV.
+    /// Energy in keV.
     pub energy_kev: f64,
     /// Photons of this line per photoelectric absorption.
     pub probability: f64,
 }
 
 impl KFluorescence {
-    /// From edge, yield, K share, and (energy, share) of the lines as they stand in the embedded table; all zero for none.
+    /// From edge, yield, K share, and (energy, share) of the lines in the embedded table; `None` if all are zero.
     pub(crate) fn from_table(numbers: &[f64]) -> Option<Self> {
         let (&[edge_kev, fluorescence_yield, k_share], lines) = numbers.split_first_chunk()?;
         (edge_kev > 0.0).then(|| Self {
@@ -43,7 +43,7 @@ impl KFluorescence {
         })
     }
 
-    /// The lines of photons absorbed above the edge in a material in which this element does the share `element_share` of
+    /// The lines of photons absorbed above the edge in a material in which this element has the share `element_share` of
     /// the photoelectric absorption.
     pub(crate) fn lines(&self, element_share: f64) -> impl Iterator<Item = FluorescenceLine> {
         let per_absorption = element_share * self.k_share * self.fluorescence_yield;
@@ -62,7 +62,7 @@ impl KFluorescence {
 pub(crate) struct Fluorescence {
     energies: Octaves,
     emitters: Vec<Emitter>,
-    /// No absorption emits with a larger probability.
+    /// Largest emission probability of any absorption.
     most: f64,
 }
 
@@ -70,7 +70,7 @@ pub(crate) struct Fluorescence {
 #[derive(Clone, Debug)]
 struct Emitter {
     edge_kev: f64,
-    /// Energy in keV of each line, and photons of it per absorption by this element.
+    /// Energy in keV of each line, and its photons per absorption by this element.
     lines: Vec<(f64, f64)>,
     /// Share of the element in the photoelectric absorption, by energy.
     share: Vec<f32>,
@@ -80,7 +80,7 @@ struct Emitter {
 const ENERGY_BITS: u32 = 6;
 
 impl Fluorescence {
-    /// Lines below `cutoff_kev` count as absorbed.
+    /// Prepares a sampler; lines below `cutoff_kev` count as absorbed.
     pub(crate) fn new(material: &Material, cutoff_kev: f64) -> Self {
         let energies = Octaves::covering(MIN_ENERGY_KEV, MAX_ENERGY_KEV, ENERGY_BITS);
         let emitters: Vec<Emitter> = material
@@ -112,7 +112,7 @@ impl Fluorescence {
         }
     }
 
-    /// Energy of the photon that follows an absorption at `energy_kev`, if one does; `u` uniform in [0, 1).
+    /// Energy of the photon emitted after an absorption at `energy_kev`, if any; `u` is uniform in [0, 1).
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f64, u: f64) -> Option<f64> {
         if u < self.most {
@@ -132,7 +132,7 @@ impl Fluorescence {
         None
     }
 
-    /// Energies in keV of the photons that may follow an absorption at `energy_kev`, with the probability of each.
+    /// Energies in keV of the photons that may be emitted after an absorption at `energy_kev`, with their probabilities.
     pub(crate) fn lines(&self, energy_kev: f64) -> impl Iterator<Item = (f64, f64)> {
         let emitters = self.emitters.iter();
         emitters
@@ -171,7 +171,7 @@ mod tests {
         }
     }
 
-    /// Photons per absorption and their mean energy, over an even grid of uniforms, against the sums over the lines.
+    /// Photons per absorption and their mean energy, over a uniform grid of random numbers, against the sums over the lines.
     #[test]
     fn samples_follow_the_lines() {
         for (name, energy_kev) in [
@@ -194,7 +194,7 @@ mod tests {
                 .iter()
                 .map(|line| line.probability * line.energy_kev)
                 .sum();
-            // 3e-3 by the interpolation of the shares beside the edges of neighbours.
+            // 3e-3 from the interpolation of the shares next to the edges of neighbours.
             assert!(
                 (emitted.len() as f64 / f64::from(n) - probability).abs() < 3e-3,
                 "{name}"

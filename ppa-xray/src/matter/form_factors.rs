@@ -1,4 +1,4 @@
-//! Which form factors coherent scattering follows.
+//! Choice of form factors for coherent scattering.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Compton scattering off bound, moving electrons: the impulse approximation.
 //!
-//! dσ/dΩ = ½ rₑ² τ² (τ + 1/τ − sin²θ) Σ f Θ(E − U) n(p_max), and at a given angle the electron's momentum p along the scattering vector from its
-//! one-electron profile up to p_max, at which it is only just freed; p gives the energy (Ribberfors and Berggren 1982,
-//! doi:10.1103/PhysRevA.26.3325; Brusa et al. 1996, doi:10.1016/0168-9002(96)00652-3, as in PENELOPE and MC-GPU).
+//! dσ/dΩ = ½ rₑ² τ² (τ + 1/τ − sin²θ) Σ f Θ(E − U) n(p_max). At a given angle the electron's momentum p along the scattering
+//! vector follows its one-electron profile up to p_max, the limit at which it is just freed; p gives the energy (Ribberfors and Berggren
+//! 1982, doi:10.1103/PhysRevA.26.3325; Brusa et al. 1996, doi:10.1016/0168-9002(96)00652-3, as in PENELOPE and MC-GPU).
 //! Momenta are in units of mₑc.
 
 use crate::matter::{
@@ -12,11 +12,11 @@ use crate::matter::{
     natural_log::{exp, ln},
 };
 
-/// Rejections in a row after which the shells are weighed one by one at a given angle.
+/// Consecutive rejections after which the shells are weighted individually at a given angle.
 const TRIALS: u32 = 8;
 
-/// Rejections in a row after which the electron counts as free and at rest: tables of a user may hold shells that let
-/// almost nothing through, and no photon may hang. The embedded elements need a few.
+/// Consecutive rejections after which the electron counts as free and at rest. User tables may contain shells that are almost
+/// always rejected, and the loop must end. The embedded elements need a few.
 const PATIENCE: u32 = 1000;
 
 /// Momentum beyond which the correction factor of the differential cross-section stays constant, as in PENELOPE.
@@ -29,7 +29,7 @@ const SMALLEST_TAIL: f32 = 1e-30;
 #[derive(Clone, Debug)]
 pub(crate) struct ImpulseApproximation {
     angles: &'static KleinNishina,
-    /// Walker's alias table over the shells by electron number: of entry i, `keep` stays with shell i.
+    /// Walker's alias table over the shells by electron number: the share `keep` of entry i stays with shell i.
     entries: Vec<Entry>,
     /// Share of the electrons in each shell.
     shells: Vec<(f32, BoundElectron)>,
@@ -38,7 +38,7 @@ pub(crate) struct ImpulseApproximation {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     keep: f32,
-    /// The shell of this entry, and the one that fills it up.
+    /// The shell of this entry, and the shell that fills it up.
     shells: [BoundElectron; 2],
 }
 
@@ -50,10 +50,10 @@ pub(crate) struct BoundElectron {
     pub(crate) momentum: f32,
 }
 
-/// What [`BoundElectron::outcome`] says instead of an energy: the electron cannot be freed.
+/// Returned by [`BoundElectron::outcome`] instead of an energy: the electron cannot be freed.
 const NOT_FREED: f32 = -1.0;
 
-/// The electron could be freed, but the correction factor of the cross section turns its momentum down.
+/// The electron could be freed, but the correction factor of the cross section rejects its momentum.
 const TURNED_DOWN: f32 = 0.0;
 
 impl ImpulseApproximation {
@@ -92,10 +92,10 @@ impl ImpulseApproximation {
         }
     }
 
-    /// sin²(θ/2) and the energy of the scattered photon in keV.
+    /// Samples sin²(θ/2) and the energy of the scattered photon in keV.
     ///
-    /// Angle from Klein–Nishina, shell by its electrons, momentum from the whole profile; all three again if that electron
-    /// cannot be freed. This is the product with Σ f n(p_max) without computing it.
+    /// Samples the angle from Klein–Nishina, the shell by its electrons, and the momentum from the full profile, and repeats all three if
+    /// the electron cannot be freed. This gives the product with Σ f n(p_max) without computing it.
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f32, mut uniform: impl FnMut() -> f32) -> (f32, f32) {
         for _ in 0..PATIENCE {
@@ -115,7 +115,7 @@ impl ImpulseApproximation {
         (sin2_half_theta, off_resting(energy_kev, sin2_half_theta))
     }
 
-    /// sin²(θ/2) of Klein–Nishina and an electron, whether or not the photon can free it at that angle.
+    /// Samples sin²(θ/2) of Klein–Nishina and an electron, whether or not the photon can free it at that angle.
     #[inline(always)]
     pub(crate) fn attempt(
         &self,
@@ -127,7 +127,7 @@ impl ImpulseApproximation {
         (sin2_half_theta, self.electron(u_shell))
     }
 
-    /// Energy of a photon scattered by a given angle.
+    /// Samples the energy of a photon scattered by a given angle.
     pub(crate) fn sample_energy(
         &self,
         energy_kev: f32,
@@ -156,7 +156,7 @@ impl ImpulseApproximation {
         off_resting(energy_kev, sin2_half_theta)
     }
 
-    /// An electron of a shell by f n(p_max), and n(p_max): for angles so small that hardly one can be freed.
+    /// Samples an electron of a shell by f n(p_max), and returns n(p_max): for angles so small that hardly any electron can be freed.
     fn electron_freed(
         &self,
         energy_kev: f32,
@@ -173,7 +173,7 @@ impl ImpulseApproximation {
         })
     }
 
-    /// An electron of a shell by its number of electrons.
+    /// Samples an electron of a shell by its number of electrons.
     #[inline(always)]
     fn electron(&self, u: f32) -> BoundElectron {
         let at = u * self.entries.len() as f32;
@@ -195,7 +195,7 @@ impl BoundElectron {
         )
     }
 
-    /// n(p_max): share of such electrons that the photon can free.
+    /// n(p_max): share of the electrons of this shell that the photon can free.
     fn share_freed(&self, energy_kev: f32, sin2_half_theta: f32) -> f32 {
         let (limit, squared) = self.limit(energy_kev, sin2_half_theta);
         if self.binding_kev >= energy_kev || squared == 0.0 {
@@ -206,10 +206,10 @@ impl BoundElectron {
         if limit < 0.0 { beyond } else { 1.0 - beyond }
     }
 
-    /// Energy of the photon after it met this electron at the cumulative probability `u_momentum` of its profile; or
-    /// [`NOT_FREED`] if p > p_max, or [`TURNED_DOWN`] by the factor F(p) = 1 + a p. All in all straight-line arithmetic.
+    /// Energy of the photon scattered by this electron at the cumulative probability `u_momentum` of its profile; or
+    /// [`NOT_FREED`] if p > p_max, or [`TURNED_DOWN`] by the factor F(p) = 1 + a p. The arithmetic has no branches.
     ///
-    /// Where the electron could be freed moving either way, F chooses the way instead of rejecting: the two F add up to 2.
+    /// If the electron could be freed at both +p and −p, F selects the sign instead of rejecting: the two F add up to 2.
     #[inline(always)]
     pub(crate) fn outcome(
         &self,
@@ -223,7 +223,7 @@ impl BoundElectron {
         let reach = (1.0 - 2.0 * ln(tail.max(SMALLEST_TAIL))).sqrt();
         let size = self.momentum * (reach - 1.0);
         let t = size * size;
-        // −|p| ≤ p_max or |p| ≤ p_max, without the roots.
+        // −|p| ≤ p_max or |p| ≤ p_max, without computing the roots.
         let (limit, squared) = self.limit(energy_kev, sin2_half_theta);
         let (beyond, below) = (t * squared >= limit * limit, t * squared <= limit * limit);
         let either_way = (limit >= 0.0) & below;
@@ -246,7 +246,7 @@ impl BoundElectron {
         } else {
             -size
         };
-        // Root of the quadratic for E′ at given p, its cancelling terms collected.
+        // Root of the quadratic for E′ at given p, with the cancelling terms collected.
         let sin_squared = 4.0 * sin2_half_theta * (1.0 - sin2_half_theta);
         let shift = p * (vector - t * sin_squared).max(0.0).sqrt();
         let scattered = energy_kev * (d - t * (1.0 - 2.0 * sin2_half_theta) + shift) / (d * d - t);
@@ -260,13 +260,13 @@ impl BoundElectron {
     }
 }
 
-/// E′ of an electron at rest.
+/// E′ for an electron at rest.
 #[inline(always)]
 pub(crate) fn off_resting(energy_kev: f32, sin2_half_theta: f32) -> f32 {
     energy_kev / (1.0 + energy_kev * sin2_half_theta * (2.0 / ELECTRON_REST_KEV) as f32)
 }
 
-/// Σ f Θ(E − U) n(p_max), the electrons that take part at an angle.
+/// Σ f Θ(E − U) n(p_max), the number of electrons that contribute at an angle.
 pub(crate) fn electrons_freed(shells: &[Shell], energy_kev: f64, sin2_half_theta: f64) -> f64 {
     shells
         .iter()

@@ -12,7 +12,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub(crate) struct IncoherentFunction {
     angles: &'static KleinNishina,
-    /// S of the material over x = q², relative, never decreasing.
+    /// S of the material over x = q², relative, non-decreasing.
     incoherent: Vec<f32>,
     grid: Octaves,
 }
@@ -49,7 +49,7 @@ impl IncoherentFunction {
         }
     }
 
-    /// sin²(θ/2) and the energy of the scattered photon in keV: an angle of Klein–Nishina is kept with S/S(backwards).
+    /// Samples sin²(θ/2) and the energy of the scattered photon in keV: a Klein–Nishina angle is accepted with S/S(backwards).
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f32, mut uniform: impl FnMut() -> f32) -> (f32, f32) {
         let energy = f64::from(energy_kev);

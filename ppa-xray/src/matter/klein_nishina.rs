@@ -24,14 +24,14 @@ const STEP_KEV: f64 = MAX_ENERGY_KEV / (ROWS - 1) as f64;
 /// Intervals of the cumulative probability.
 const COLUMNS: usize = 64;
 
-/// Quantiles of sin²(θ/2) by energy, linear between the nodes: moments are right to 1e-4.
+/// Quantiles of sin²(θ/2) by energy, linear between the nodes; moments are correct to 1e-4.
 #[derive(Debug)]
 pub(crate) struct KleinNishina {
     quantiles: [[f32; COLUMNS + 1]; ROWS],
 }
 
 impl KleinNishina {
-    /// The table, made once.
+    /// Returns the table, computed once.
     pub(crate) fn table() -> &'static Self {
         static TABLE: OnceLock<KleinNishina> = OnceLock::new();
         TABLE.get_or_init(|| Self {

@@ -1,4 +1,4 @@
-//! Named materials: [`MIXTURES`] of tissues, plastics, alloys and compounds; elements by symbol, or by the names in
+//! Named materials: [`MIXTURES`] of tissues, plastics, alloys and compounds; elements by symbol or by the names in
 //! [`ELEMENT_NAMES`].
 
 use crate::{
@@ -155,7 +155,7 @@ const ICRU_46: &[Entry] = &[
 
 #[rustfmt::skip]
 const IMPLANTS: &[Entry] = &[
-    // (C2H4)n of bearings, ASTM F648.
+    // (C2H4)n, used in bearings, ASTM F648.
     entry("uhmwpe", 0.935, &[(1, 0.143711), (6, 0.856289)]),
     // Ca10(PO4)6(OH)2.
     entry("hydroxyapatite", 3.16, &[(1, 0.002007), (8, 0.414068), (15, 0.184987), (20, 0.398938)]),
@@ -173,13 +173,13 @@ const IMPLANTS: &[Entry] = &[
 const EQUIPMENT: &[Entry] = &[
     // Carbon fibres in epoxy resin, 68 % fibres by mass (60 % by volume), the resin as C21H24O4.
     entry("carbon_fibre", 1.58, &[(1, 0.0228), (6, 0.9171), (8, 0.0601)]),
-    // Cellulose, C6H10O5, as loose as the interspace of a grid.
+    // Cellulose, C6H10O5, with the low density of a grid interspace.
     entry("paper", 0.8, &[(1, 0.062284), (6, 0.444376), (8, 0.49334)]),
     // Amorphous; the crystal has 4.8 g/cm³ (Kasap et al. 2009, doi:10.1002/pssb.200982007).
     entry("a_selenium", 4.28, &[(34, 1.0)]),
 ];
 
-/// Mixtures by where their composition comes from.
+/// Mixtures, grouped by the source of their composition.
 const MIXTURES: &[(&str, &[Entry])] = &[
     (
         "NIST compound list, with its ICRP and ICRU tissues, as in xraylib 4.3.0",
@@ -194,10 +194,10 @@ const MIXTURES: &[(&str, &[Entry])] = &[
     ("stoichiometry of the usual make", EQUIPMENT),
 ];
 
-/// Materials for which measured form factors stand, with their shares of the mass.
+/// Materials with measured form factors: substances and their shares of the mass.
 ///
-/// Soft tissue (ICRP) and red marrow (ICRU 46) are muscle and fat in the ratio that gives their carbon. Bone, skin, brain and lung have
-/// no measurement.
+/// Soft tissue (ICRP) and red marrow (ICRU 46) are muscle and fat in the ratio that gives their carbon. Bone, skin, brain and lung
+/// have no measurement.
 const MEASURED: &[(&str, &[(Measured, f64)])] = &[
     ("water", &[(Measured::Water, 1.0)]),
     ("muscle", &[(Measured::Muscle, 1.0)]),
@@ -222,10 +222,10 @@ const MEASURED: &[(&str, &[(Measured, f64)])] = &[
     ("pmma", &[(Measured::Pmma, 1.0)]),
 ];
 
-/// Where the data of pure elements comes from.
+/// Source of the data of pure elements.
 const ELEMENT_SOURCE: &str = "element, density as in xraylib 4.3.0";
 
-/// Elements that are asked for by name.
+/// Elements with a name in addition to the symbol.
 const ELEMENT_NAMES: &[(&str, u8)] = &[
     ("beryllium", 4),
     ("carbon", 6),
@@ -254,7 +254,7 @@ fn mixtures() -> impl Iterator<Item = (&'static str, &'static Entry)> {
         .flat_map(|&(source, entries)| entries.iter().map(move |entry| (source, entry)))
 }
 
-/// Names of mixtures and elements and the source of their composition; symbols are accepted besides.
+/// Names of mixtures and elements and the source of their composition; symbols are also accepted.
 pub(crate) fn names_and_sources() -> impl Iterator<Item = (&'static str, &'static str)> {
     let elements = ELEMENT_NAMES
         .iter()
@@ -264,7 +264,7 @@ pub(crate) fn names_and_sources() -> impl Iterator<Item = (&'static str, &'stati
         .chain(elements)
 }
 
-/// Material of a name or an element symbol, in any case.
+/// Returns the material with a name or an element symbol, case-insensitive.
 pub(crate) fn find(name: &str) -> Option<Material> {
     if let Some((_, entry)) = mixtures().find(|(_, entry)| entry.name.eq_ignore_ascii_case(name)) {
         let material =
@@ -300,7 +300,7 @@ mod tests {
         }
     }
 
-    /// The two compositions of a tissue differ by a few percent where it matters.
+    /// The compositions of a tissue in two reports differ by a few percent where it matters.
     #[test]
     fn tissues_of_different_reports_are_alike() {
         for (name, other) in [

@@ -1,4 +1,4 @@
-//! Materials: elements by weight or tables, and their cross sections per gram.
+//! Materials: elements by weight or photon tables, and their cross sections per gram.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::{
     matter::tabulated_matter::TabulatedMatter,
 };
 
-/// A homogeneous material: elements by mass fraction, or tables of its own, and a nominal density.
+/// A homogeneous material: elements by mass fraction, or its own photon tables, and a nominal density.
 ///
 /// ```
 /// use ppa_xray::Material;
@@ -39,16 +39,16 @@ pub struct Material {
     molecular: Option<Arc<MolecularScatter>>,
 }
 
-/// Where the photon data comes from.
+/// Source of the photon data.
 #[derive(Clone, Debug, PartialEq)]
 enum Matter {
-    /// The embedded data of the elements, by mass fraction.
+    /// Embedded data of the elements, by mass fraction.
     Elements(Composition),
     Tables(Arc<TabulatedMatter>),
 }
 
 impl Material {
-    /// Material from (atomic number, mass fraction) pairs, Z = 1 to 92.
+    /// Builds a material from (atomic number, mass fraction) pairs, Z = 1 to 92.
     ///
     /// Fractions that add up to 1 within 1 % are normalised; zero fractions are dropped.
     ///
@@ -80,10 +80,10 @@ impl Material {
         })
     }
 
-    /// Material from photon data of its own.
+    /// Builds a material from its own photon data.
     ///
     /// # Errors
-    /// A density that is not positive; tables that are empty, of unlike lengths, not ascending, negative or not
+    /// A density that is not positive; tables that are empty, of different lengths, not ascending, negative or not
     /// finite, or outside 1 to 150 keV.
     pub fn from_tables(
         name: impl Into<String>,
@@ -101,7 +101,7 @@ impl Material {
         })
     }
 
-    /// The same elements, for which measured form factors stand in these shares of the mass.
+    /// The same elements, with measured form factors for these shares of the mass.
     pub(crate) fn measured_as(mut self, shares: &[(Measured, f64)]) -> Self {
         if let Matter::Elements(composition) = &self.matter {
             let part = |&(measured, share): &(Measured, f64)| Part {
@@ -118,7 +118,7 @@ impl Material {
     ///
     /// [`FormFactors::Molecular`] changes materials of the library that have a measured form factor, and mixtures of them. Their Rayleigh
     /// cross section becomes the integral of Thomson's law times the square of that form factor. Other
-    /// materials, and those made from tables, stay as they are.
+    /// materials, and those made from tables, are unchanged.
     #[must_use]
     pub fn with_form_factors(mut self, form_factors: FormFactors) -> Self {
         self.molecular = match form_factors {
@@ -130,7 +130,7 @@ impl Material {
         self
     }
 
-    /// The form factors that its Rayleigh scattering follows; [`FormFactors::Molecular`] if a measured one has a share in it.
+    /// The form factors used for Rayleigh scattering; [`FormFactors::Molecular`] if a measured one contributes.
     #[must_use]
     pub fn form_factors(&self) -> FormFactors {
         if self.molecular.is_some() {
@@ -140,10 +140,10 @@ impl Material {
         }
     }
 
-    /// Material from text such as `Ca:0.4,O:0.6`: symbols and mass fractions.
+    /// Builds a material from text such as `Ca:0.4,O:0.6`: symbols and mass fractions.
     ///
     /// # Errors
-    /// Text of another form, and everything [`Material::from_composition`] refuses.
+    /// Text that does not parse, and the errors of [`Material::from_composition`].
     pub fn parse_composition(
         name: impl Into<String>,
         density_g_cm3: f64,
@@ -154,10 +154,10 @@ impl Material {
         Self::from_elements(name, density_g_cm3, composition)
     }
 
-    /// Materials mixed by mass fraction. The mixture scatters by molecular form factors if one of its parts does.
+    /// Mixes materials by mass fraction. The mixture scatters by molecular form factors if one of its parts does.
     ///
     /// # Errors
-    /// Everything [`Material::from_composition`] refuses, and a part made from tables, whose elements are not known.
+    /// The errors of [`Material::from_composition`], and a part made from tables, whose elements are not known.
     pub fn mixture(
         name: impl Into<String>,
         density_g_cm3: f64,
@@ -185,10 +185,10 @@ impl Material {
         })
     }
 
-    /// Material of the library, such as `water`, `bone_cortical` or `titanium`, or a pure element by symbol, such as `Al`.
+    /// Returns a material of the library, such as `water`, `bone_cortical` or `titanium`, or a pure element by symbol, such as `Al`.
     ///
     /// # Errors
-    /// A name that [`Material::names`] does not list and that is not a symbol.
+    /// A name that is neither listed by [`Material::names`] nor a symbol.
     pub fn named(name: &str) -> Result<Self, MaterialError> {
         library::find(name).ok_or_else(|| MaterialError::Unknown {
             name: name.to_owned(),
@@ -201,7 +201,7 @@ impl Material {
         library::names_and_sources().map(|(name, _)| name)
     }
 
-    /// Where the composition of a named material comes from; nothing for names that are not in the library.
+    /// Source of the composition of a named material; `None` for names that are not in the library.
     #[must_use]
     pub fn source_of(name: &str) -> Option<&'static str> {
         library::names_and_sources()
@@ -209,13 +209,13 @@ impl Material {
             .map(|(_, source)| source)
     }
 
-    /// Name.
+    /// Name of the material.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Nominal density in g/cm³; transport takes the density of the voxel instead.
+    /// Nominal density in g/cm³; the transport uses the density of the voxel instead.
     #[must_use]
     pub fn density_g_cm3(&self) -> f64 {
         self.density_g_cm3
@@ -234,15 +234,15 @@ impl Material {
         }
     }
 
-    /// The mass fractions as [`Material::parse_composition`] reads them. Empty if made from tables.
+    /// The mass fractions in the format of [`Material::parse_composition`]. Empty if made from tables.
     #[must_use]
     pub fn composition(&self) -> String {
         self.elements().map(Composition::text).unwrap_or_default()
     }
 
-    /// Energies in keV between which the material has data: 1 to 150, or what its own tables hold of that.
+    /// Energy range of the data in keV: 1 to 150, or the part of it that the material's own tables cover.
     ///
-    /// Transport takes the values at the lower end for photons that scatter to below it.
+    /// The transport uses the values at the lower end for photons scattered to lower energies.
     #[must_use]
     pub fn energy_range_kev(&self) -> [f64; 2] {
         match &self.matter {
@@ -267,8 +267,8 @@ impl Material {
         Ok(self.cross_sections_unchecked(energy_kev))
     }
 
-    /// As [`Material::cross_sections`] at an energy known to be inside 1 to 150 keV; beyond tables of its own, the values
-    /// at their nearer end.
+    /// The same as [`Material::cross_sections`] for an energy known to be inside 1 to 150 keV. Beyond the material's own tables, returns
+    /// the values at the nearer end.
     pub(crate) fn cross_sections_unchecked(&self, energy_kev: f64) -> CrossSections {
         let sections = match &self.matter {
             Matter::Elements(composition) => composition.cross_sections(energy_kev),
@@ -354,7 +354,7 @@ impl Material {
         }
     }
 
-    /// K photons that may follow photoelectric absorption at an energy; none of a material made from tables.
+    /// K photons that may follow photoelectric absorption at an energy; empty for a material made from tables.
     #[must_use]
     pub fn k_fluorescence(&self, energy_kev: f64) -> Vec<FluorescenceLine> {
         self.k_emitters()
@@ -385,7 +385,7 @@ impl Material {
     }
 }
 
-/// The parts of a mixture by mass fraction; none if nothing in it has a measured form factor.
+/// The parts of a mixture by mass fraction; empty if no part has a measured form factor.
 fn mixed(materials: &[(&Material, f64)]) -> Vec<Part> {
     if materials
         .iter()
@@ -431,7 +431,7 @@ mod tests {
     use crate::matter::cross_sections::{ELECTRON_REST_KEV, HC_KEV_ANGSTROM};
 
     proptest! {
-        /// A mixture attenuates as its elements do, by weight.
+        /// The attenuation of a mixture is the weighted sum of that of its elements.
         #[test]
         fn mixtures_follow_the_weights(z1 in 1..=46_u8, z2 in 47..=92_u8, share in 0.0..1.0_f64, energy_kev in 1.0..150.0_f64) {
             let alone = |z| Material::from_composition("element", 1.0, &[(z, 1.0)]).unwrap().total_cm2_g(energy_kev).unwrap();
@@ -441,7 +441,7 @@ mod tests {
         }
     }
 
-    /// Integrating Thomson × F² and Klein–Nishina × S gives the tabulated cross sections back.
+    /// The integrals of Thomson × F² and Klein–Nishina × S reproduce the tabulated cross sections.
     ///
     /// σ = ½ π rₑ² N_A Σ w/A ∫ … dcos; 4 % for Rayleigh, whose table includes anomalous scattering.
     #[test]

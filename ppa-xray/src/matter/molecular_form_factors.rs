@@ -1,27 +1,27 @@
 //! Measured molecular form factors of D. E. Peplow and K. Verghese, Phys. Med. Biol. 43 (1998) 2431.
 //!
 //! The numbers are those that EGSnrc distributes with permission (`HEN_HOUSE/data/molecular_form_factors`), which lists F/√M with
-//! M in g/mol over q = sin(θ/2)/λ in 1/Å, up to 0.9/Å; beyond that its tables hold the values of free atoms. Values below 0.1/Å of tissues of mostly
-//! water, and below 0.05/Å of fat, are constant: the tables extrapolate there. That of water, 0.5871, is the limit at q = 0 set by its
-//! compressibility.
+//! M in g/mol over q = sin(θ/2)/λ in 1/Å, up to 0.9/Å; beyond that its tables hold the values of free atoms. Below 0.1/Å for tissues that
+//! are mostly water, and below 0.05/Å for fat, the tables extrapolate with a constant. That of water, 0.5871, is the limit at q = 0 set by
+//! its compressibility.
 
 /// A substance whose form factor was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measured {
     Water,
-    /// Of pork.
+    /// Pork.
     Fat,
-    /// Of pork.
+    /// Pork.
     Muscle,
-    /// Of beef.
+    /// Beef.
     Blood,
-    /// Of a human.
+    /// Human.
     Breast,
     Pmma,
 }
 
 impl Measured {
-    /// F²/M in mol/g at q in 1/Å up to [`LAST_Q`], with F a straight line between the nodes.
+    /// F²/M in mol/g at q in 1/Å up to [`LAST_Q`], with F linear between the nodes.
     pub(crate) fn squared_per_gram(self, q: f64) -> f64 {
         let upper = Q.partition_point(|&node| node <= q).clamp(1, NODES - 1);
         let [q0, q1] = [Q[upper - 1], Q[upper]];
@@ -53,7 +53,7 @@ const Q: [f64; NODES] = [
     0.40, 0.42, 0.44, 0.45, 0.46, 0.48, 0.50, 0.55, 0.60, 0.65, 0.70, 0.80, 0.90,
 ];
 
-/// F/√M in √(mol/g), as the others below.
+/// F/√M in √(mol/g), as in the tables below.
 const WATER: [f64; NODES] = [
     0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.5871, 0.7338,
     1.048, 1.299, 1.568, 1.8, 1.876, 1.84, 1.758, 1.667, 1.6, 1.56, 1.451, 1.324, 1.167, 0.9384,

@@ -1,4 +1,4 @@
-//! Coherent scattering of a material that holds substances with measured form factors.
+//! Coherent scattering of a material that contains substances with measured form factors.
 
 use crate::{
     matter::composition::Composition,
@@ -14,10 +14,10 @@ use crate::{
 const Q_SQUARED_BITS: u32 = 5;
 const MIN_Q_SQUARED: f64 = 1e-5;
 
-/// q in 1/Å from which free atoms stand for the substance; between the measured values and there, F is a straight line.
+/// q in 1/Å above which the substance scatters like free atoms; between the measured values and this q, F is linear.
 const ATOMS_FROM_Q: f64 = 1.0;
 
-/// A share of a material's mass, and the measurement that stands for it.
+/// A share of a material's mass, and the measurement that describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Part {
     /// Share of the mass.
@@ -47,7 +47,7 @@ impl Part {
 
 /// Form factor and cross section of all parts of a material together.
 ///
-/// Intensities of the parts add up. The cross section of what was measured is the integral of Thomson's law times F²; that of the
+/// Intensities of the parts add up. The cross section of a measured part is the integral of Thomson's law times F²; that of the
 /// rest is the tabulated one of its elements.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MolecularScatter {
@@ -92,7 +92,7 @@ impl MolecularScatter {
         atoms + self.measured_cm2_g(energy_kev)
     }
 
-    /// Puts [`MolecularScatter::rayleigh_cm2_g`] into cross sections at [`energy_nodes`].
+    /// Writes [`MolecularScatter::rayleigh_cm2_g`] into cross sections at [`energy_nodes`].
     pub(crate) fn replace_at_nodes(&self, sections: &mut [CrossSections]) {
         for (section, energy_kev) in sections.iter_mut().zip(energy_nodes()) {
             section.rayleigh = self.measured_cm2_g(energy_kev);
@@ -154,7 +154,7 @@ mod tests {
         }
     }
 
-    /// The published F/√M of water at its peak, and F² where the measurement meets the free atoms.
+    /// The published F/√M of water at its peak, and F² where the measurement joins the free atoms.
     #[test]
     fn form_factors_are_the_published_ones_and_join_the_atoms() {
         let water = molecular("water");
@@ -187,7 +187,7 @@ mod tests {
         let [mixed, water, bone] =
             [&mixture, &water, &bone].map(|material| material.form_factor_squared_per_gram(0.16));
         assert!((mixed / (0.3 * water + 0.7 * bone) - 1.0).abs() < 1e-12);
-        // The choice of a part is that of the mixture, and can be taken back.
+        // A mixture selects the form factors of its parts, and the selection can be undone.
         let water = molecular("water");
         let again = Material::mixture("mixture", 1.5, &[(&water, 0.3), (&bone_cortical(), 0.7)]);
         assert_eq!(again.unwrap(), mixture);

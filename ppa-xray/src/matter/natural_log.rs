@@ -1,9 +1,9 @@
-//! Logarithm and exponential with the same bits on every machine.
+//! Bit-reproducible logarithm and exponential on every machine.
 
 /// ln x of a positive, normal number, within 2e-7 of the value (of 0.05 where the value is smaller).
 ///
-/// The mathematical library of the system may differ in the last bit from machine to machine, and a sampled history
-/// with it. Here x = 2ᵏ (1 + f) with f between √½ − 1 and √2 − 1, and ln(1 + f) = f + f² P(f) with P interpolated at the
+/// The system's mathematical library may differ in the last bit from machine to machine, which would change sampled
+/// histories. Here x = 2ᵏ (1 + f) with f between √½ − 1 and √2 − 1, and ln(1 + f) = f + f² P(f) with P interpolated at the
 /// Chebyshev points.
 #[inline(always)]
 pub(crate) fn ln(x: f32) -> f32 {
@@ -21,11 +21,11 @@ pub(crate) fn ln(x: f32) -> f32 {
     let above = x.to_bits().wrapping_sub(SQRT_HALF);
     let exponent = (above as i32 >> 23) as f32;
     let f = f32::from_bits((above & 0x007f_ffff) + SQRT_HALF) - 1.0;
-    // Pairs first (Estrin): a shorter chain of dependent steps than Horner's.
+    // Pairs first (Estrin): a shorter dependency chain than Horner's scheme.
     let square = f * f;
     let pair = |i: usize| P[i] + P[i + 1] * f;
     let p = (pair(0) + pair(2) * square) + (pair(4) + pair(6) * square) * (square * square);
-    // ln 2 in two parts, the first exact in few bits, keeps the product with k exact.
+    // ln 2 in two parts, the first exact in few bits, which keeps the product with k exact.
     exponent * 0.693_359_4 + (f + (square * p + exponent * -2.121_944_4e-4))
 }
 
@@ -57,7 +57,7 @@ pub(crate) fn exp(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// From 2⁻⁷⁰ to 2⁷⁰, and densely about 1, where the result is small itself.
+    /// From 2⁻⁷⁰ to 2⁷⁰, and densely around 1, where the result itself is small.
     #[test]
     fn follows_the_exact_logarithm() {
         let far = (0..200_000).map(|i| (f64::from(i) * 0.0007 - 70.0).exp2() as f32);

@@ -1,15 +1,15 @@
-//! Materials that bring their own photon data instead of a composition.
+//! Photon data of materials that are given by tables instead of a composition.
 
 use crate::matter::electron_shell::Shell;
 
-/// Photon data of one material, such as a material file of MC-GPU holds.
+/// Photon data of one material, such as the contents of an MC-GPU material file.
 ///
-/// Between nodes, cross sections and form factors are straight lines in log-log.
+/// Cross sections and form factors are interpolated log-log between nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotonTables {
     /// Nominal density in g/cm³.
     pub density_g_cm3: f64,
-    /// Energies of the cross sections in keV, ascending; an edge may stand twice.
+    /// Energies of the cross sections in keV, ascending; an edge may be listed twice.
     pub energies_kev: Vec<f64>,
     /// Photoelectric absorption at each energy, cm²/g.
     pub photoelectric_cm2_g: Vec<f64>,
@@ -19,9 +19,9 @@ pub struct PhotonTables {
     pub rayleigh_cm2_g: Vec<f64>,
     /// Pairs (q², F²), ascending in q²: q = sin(θ/2)/λ in 1/Å, F² up to a constant factor.
     ///
-    /// Constant below the first node; beyond the last one the last power law continues.
+    /// Constant below the first node; the last power law continues beyond the last node.
     pub form_factor_squared: Vec<[f64; 2]>,
-    /// Electron shells; only the ratios of their electron numbers count.
+    /// Electron shells; only the ratios of their electron numbers matter.
     ///
     /// J₀ of an MC-GPU or PENELOPE file (FJ0, in 1/mₑc) is 137.036 times that of a [`Shell`].
     pub shells: Vec<Shell>,

@@ -8,7 +8,7 @@ use crate::{
     octaves::Octaves,
 };
 
-/// Quantile bins per octave of the probability that lies beyond, as a power of two: of free atoms, and of measured form factors with
+/// Quantile bins per octave of the tail probability, as a power of two: for free atoms, and for measured form factors with
 /// their peaks.
 const TAIL_BITS: u32 = 6;
 const TAIL_BITS_OF_PEAKS: u32 = 8;
@@ -23,7 +23,7 @@ const MIN_Q_SQUARED: f64 = 1e-5;
 ///
 /// With x = q², q = sin(θ/2) E/hc, the distribution is F²(x) dx · (1 + cos²θ)/2: x from the inverse of the
 /// cumulative ∫F² dx up to its backward value, then rejection (Baró et al. 1994, doi:10.1016/0969-806X(94)90083-3).
-/// One inverse serves all energies: x by the share of ∫F² dx that lies beyond it, on a grid of octaves, since F² ends in a power law.
+/// One inverse serves all energies: x as a function of the share of ∫F² dx beyond it, on a grid of octaves, since F² ends in a power law.
 #[derive(Clone, Debug)]
 pub(crate) struct Rayleigh {
     /// x in 1/Å² by the share beyond it, linear between the nodes.
@@ -87,7 +87,7 @@ impl Rayleigh {
         }
     }
 
-    /// sin²(θ/2) of a scattered photon.
+    /// Samples sin²(θ/2) of a scattered photon.
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f32, mut uniform: impl FnMut() -> f32) -> f32 {
         let (bin, fraction) = self.energies.locate(f64::from(energy_kev));
@@ -104,7 +104,7 @@ impl Rayleigh {
         }
     }
 
-    /// x beyond which the share `tail` of ∫F² dx lies.
+    /// x beyond which the share of ∫F² dx is `tail`.
     #[inline(always)]
     fn x(&self, tail: f32) -> f32 {
         let width = 1 << self.tail_shift;
@@ -144,7 +144,7 @@ impl Cumulative {
         let width = self.x[upper] - self.x[upper - 1];
         let slope = (self.squared[upper - 1] - self.squared[upper]) / width;
         let last = self.squared[upper];
-        // Root of F² d + ½ slope d² = rest that does not cancel.
+        // Root of F² d + ½ slope d² = rest, in a form without cancellation.
         let root = (last * last + 2.0 * slope * rest).max(0.0).sqrt();
         self.x[upper]
             - if rest > 0.0 {

@@ -1,4 +1,4 @@
-//! One material prepared for transport: cross sections without logarithms, and the scattering samplers.
+//! One material prepared for transport: cross sections evaluated without logarithms, and the scattering samplers.
 
 use ppa_core::random::Philox;
 
@@ -30,7 +30,7 @@ pub struct MaterialTables {
     fluorescence: Fluorescence,
 }
 
-/// A Compton scattering.
+/// Angle and energy of a Compton scattering.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ComptonScattering {
     /// sin²(θ/2) of the scattering angle θ.
@@ -49,7 +49,7 @@ impl ComptonScattering {
 }
 
 impl MaterialTables {
-    /// Prepares a material for Compton scattering by a model.
+    /// Prepares a material for Compton scattering by `model`.
     #[must_use]
     pub fn new(material: &Material, model: ComptonModel) -> Self {
         let q_squared = Octaves::covering(
@@ -89,7 +89,7 @@ impl MaterialTables {
             .cross_sections_unchecked(energy_kev.clamp(MIN_ENERGY_KEV, MAX_ENERGY_KEV))
     }
 
-    /// sin²(θ/2) of a Rayleigh scattering angle, with numbers of `uniform` in [0, 1).
+    /// Samples sin²(θ/2) of a Rayleigh scattering angle; `uniform` returns random numbers in [0, 1).
     #[inline]
     pub fn rayleigh_sin2_half_theta(
         &self,
@@ -100,7 +100,7 @@ impl MaterialTables {
         f64::from(sin2_half_theta)
     }
 
-    /// A Compton scattering, with numbers of `uniform` in [0, 1).
+    /// Samples a Compton scattering; `uniform` returns random numbers in [0, 1).
     #[inline]
     pub fn compton_scattering(
         &self,
@@ -115,20 +115,20 @@ impl MaterialTables {
         }
     }
 
-    /// Energy in keV of the K photon that follows photoelectric absorption, if one does above 5 keV; it is emitted isotropically.
-    /// `u` uniform in [0, 1). Materials made from tables emit none.
+    /// Energy in keV of the K photon above 5 keV that follows photoelectric absorption, if any; it is emitted isotropically.
+    /// `u` is uniform in [0, 1). Materials made from tables emit none.
     #[inline]
     #[must_use]
     pub fn k_fluorescence(&self, energy_kev: f64, u: f64) -> Option<f64> {
         self.fluorescence.sample(energy_kev, u)
     }
 
-    /// Energies in keV of the K photons above 5 keV that may follow photoelectric absorption, with the probability of each.
+    /// Energies in keV of the K photons above 5 keV that may follow photoelectric absorption, with their probabilities.
     pub(crate) fn k_lines(&self, energy_kev: f64) -> impl Iterator<Item = (f64, f64)> {
         self.fluorescence.lines(energy_kev)
     }
 
-    /// Energy in keV of a photon that Compton scattering turned by θ, with numbers of `uniform` in [0, 1).
+    /// Samples the energy in keV of a photon that was Compton scattered by θ; `uniform` returns random numbers in [0, 1).
     #[inline]
     pub fn compton_energy_at(
         &self,
@@ -143,7 +143,7 @@ impl MaterialTables {
         f64::from(sampled).min(energy_kev)
     }
 
-    /// sin²(θ/2) and the electron of one attempt at Compton scattering, of the impulse approximation; `None` for
+    /// Samples sin²(θ/2) and the electron of one attempt at Compton scattering in the impulse approximation; `None` for
     /// other models.
     #[inline(always)]
     pub(crate) fn attempt_compton(
@@ -160,13 +160,13 @@ impl MaterialTables {
         }
     }
 
-    /// Cosine of a Rayleigh scattering angle.
+    /// Samples the cosine of a Rayleigh scattering angle.
     #[inline]
     pub(crate) fn sample_rayleigh(&self, energy_kev: f64, random: &mut Philox) -> f64 {
         1.0 - 2.0 * self.rayleigh_sin2_half_theta(energy_kev, || random.unit())
     }
 
-    /// Cosine of a Compton scattering angle and the energy of the scattered photon in keV.
+    /// Samples the cosine of a Compton scattering angle and the energy of the scattered photon in keV.
     #[inline]
     pub(crate) fn sample_compton(&self, energy_kev: f64, random: &mut Philox) -> (f64, f64) {
         let scattering = self.compton_scattering(energy_kev, || random.unit());
@@ -199,7 +199,7 @@ mod tests {
             self.squares += value * value;
         }
 
-        /// Distance of the mean from `expected` in its standard errors.
+        /// Difference between the mean and `expected` in units of the standard error.
         fn z(&self, expected: f64) -> f64 {
             let n = SAMPLES as f64;
             let mean = self.sum / n;
@@ -207,7 +207,7 @@ mod tests {
         }
     }
 
-    /// ⟨cos⟩, ⟨cos²⟩ of Rayleigh and ⟨cos⟩, ⟨cos²⟩, ⟨E′⟩ of Compton scattering by sampling.
+    /// Samples ⟨cos⟩, ⟨cos²⟩ of Rayleigh and ⟨cos⟩, ⟨cos²⟩, ⟨E′⟩ of Compton scattering.
     fn moments(material: &Material, model: ComptonModel, energy_kev: f64) -> [Moment; 5] {
         let tables = MaterialTables::new(material, model);
         let mut moments: [Moment; 5] = Default::default();
@@ -344,7 +344,7 @@ mod tests {
         }
     }
 
-    /// The energy at a given angle, also where hardly an electron can be freed. 18 comparisons at 4.5 standard errors: 1e-4 per
+    /// The energy at a given angle, even where hardly any electron can be freed. 18 comparisons at 4.5 standard errors: 1e-4 per
     /// seed.
     #[test]
     fn energies_at_an_angle_have_the_mean_of_the_profiles() {
@@ -377,7 +377,7 @@ mod tests {
         }
     }
 
-    /// Our integrals are those of the reference to 1e-3 (of 1 or of the value), and the samplers follow them.
+    /// Our integrals agree with the reference to 1e-3 (of 1 or of the value), and the samplers follow them.
     #[test]
     #[ignore = "needs ../shared/reference/xray"]
     fn scatter_moments_agree_with_xraylib() {

@@ -9,28 +9,28 @@ use crate::{
     matter::material::Material, matter::thomson::ThomsonIntegral, octaves::Octaves,
 };
 
-/// Lowest energy of the tables in keV, just below that of the transport; the values there hold below it.
+/// Lowest energy of the tables in keV, just below that of the transport; its values are used below it.
 const LOWEST_KEV: f64 = 4.0;
 /// Bins per octave of energy of the normalising integrals, as a power of two.
 const ENERGY_BITS: u32 = 6;
-/// Bins per octave of energy of the electrons that take part, which hardly change with it, as a power of two.
+/// Bins per octave of energy of the contributing electrons, which depend little on it, as a power of two.
 const ROW_BITS: u32 = 2;
-/// Bins per octave of q² and smallest q² in 1/Å², of F² and of the electrons that take part.
+/// Bins per octave of q² and smallest q² in 1/Å², for F² and for the contributing electrons.
 const FORM_FACTOR: (u32, f64) = (5, 1e-5);
 const ELECTRONS: (u32, f64) = (3, 1e-4);
 /// Intervals of the normalising integrals over sin(θ/2).
 const INTERVALS: usize = 256;
 
-/// Densities of both scatterings of one material over the sphere of directions, from 4 to 150 keV.
+/// Densities of Rayleigh and Compton scattering of one material over the sphere of directions, from 4 to 150 keV.
 ///
-/// They are the laws that [`crate::MaterialTables`] samples: each integrates to 1.
+/// They are the distributions sampled by [`crate::MaterialTables`]; each integrates to 1.
 #[derive(Clone, Debug)]
 pub struct ScatterDensities {
     energies: Octaves,
     form_factor: Curve,
     rayleigh_integral: Vec<f32>,
     rows: Octaves,
-    /// Electrons that take part by q², for each energy of `rows`; a single one if they do not depend on the energy.
+    /// Contributing electrons by q², for each energy of `rows`; a single curve if they do not depend on the energy.
     electrons: Vec<Curve>,
     compton_integral: Vec<f32>,
 }
@@ -76,7 +76,7 @@ impl ScatterDensities {
             FormFactors::IndependentAtoms => {
                 integrals(&|energy, sin2_half_theta| densities.rayleigh(energy, sin2_half_theta))
             }
-            // Peaks in q are narrower than the steps of that rule at high energies.
+            // Peaks in q are narrower than the steps of Simpson's rule at high energies.
             FormFactors::Molecular => {
                 let integral = densities.form_factor.thomson_integral();
                 let nodes = densities.energies.nodes();
@@ -100,7 +100,7 @@ impl ScatterDensities {
             / self.integral(&self.rayleigh_integral, energy_kev)
     }
 
-    /// Density of Compton scattering by θ, whatever energy the photon keeps, per steradian.
+    /// Density of Compton scattering by θ, for any energy of the scattered photon, per steradian.
     #[inline]
     #[must_use]
     pub fn compton_density(&self, energy_kev: f64, cos_theta: f64) -> f64 {
@@ -122,7 +122,7 @@ impl ScatterDensities {
         self.form_factor.at(q_squared(energy_kev, sin2_half_theta)) * (1.0 + cos * cos)
     }
 
-    /// Klein–Nishina times the electrons that take part.
+    /// Klein–Nishina times the contributing electrons.
     #[inline]
     fn compton(&self, energy_kev: f64, sin2_half_theta: f64) -> f64 {
         let x = q_squared(energy_kev, sin2_half_theta);
@@ -293,7 +293,7 @@ mod tests {
                         let [low, high] = [bin, bin + 1].map(|b| b as f64 / BINS as f64);
                         let expected = SAMPLES as f64 * probability(density, low, high);
                         if expected < 5.0 {
-                            // Too few for the normal law: an allowance of a few counts.
+                            // Too few for the normal approximation: allow a few counts more.
                             assert!(f64::from(count) < expected + 6.0 * expected.sqrt() + 6.0);
                         } else {
                             chi_squared += (f64::from(count) - expected).powi(2) / expected;

@@ -10,7 +10,7 @@ use crate::matter::photon_tables::PhotonTables;
 const HARTREE_KEV: f64 = 0.027_211_386_245_988;
 const BOHR_ANGSTROM: f64 = 0.529_177_210_903;
 
-/// Tables found to be sound, ready to be asked.
+/// Validated tables, ready for interpolation.
 #[derive(Debug, PartialEq)]
 pub(crate) struct TabulatedMatter {
     range_kev: [f64; 2],
@@ -57,7 +57,7 @@ impl TabulatedMatter {
             .map(|&[x, y]| (x, y))
             .unzip();
         ascending(name, "squared momentum transfers", &q_squared, false)?;
-        // A node at q = 0 has no logarithm: the value there only says what lies below the next node.
+        // A node at q = 0 has no logarithm; its value only determines the values below the next node.
         let positive = usize::from(q_squared[0] == 0.0);
         if q_squared.len() - positive < 2 {
             return Err(MaterialError::TableLength {
@@ -194,7 +194,7 @@ fn not_negative(name: &str, what: &'static str, values: &[f64]) -> Result<(), Ma
     }
 }
 
-/// At least two finite, non-negative values, each above the one before; with `edges` a value may stand twice.
+/// Checks for at least two finite, non-negative, ascending values; with `edges` a value may occur twice.
 fn ascending(
     name: &str,
     what: &'static str,

@@ -15,7 +15,7 @@ pub(crate) struct ThomsonIntegral {
 }
 
 impl ThomsonIntegral {
-    /// From nodes x in 1/Å², ascending from 0, and the values of F² there.
+    /// Takes nodes x in 1/Å², ascending from 0, and the values of F² at the nodes.
     pub(crate) fn new(x: Vec<f64>, squared: Vec<f64>) -> Self {
         let mut sums = [0.0; 3];
         let mut moments = vec![sums];
@@ -47,13 +47,13 @@ impl ThomsonIntegral {
         8.0 * PI / backward * (m0 + 2.0 * (m2 / backward - m1) / backward)
     }
 
-    /// Cross section in cm²/g, if F² is per molar mass in mol/g.
+    /// Cross section in cm²/g if F² is divided by the molar mass, in mol/g.
     pub(crate) fn cm2_g(&self, backward: f64) -> f64 {
         0.5 * RADIUS_SQUARED_CM2_MOL * self.over_the_sphere(backward)
     }
 }
 
-/// Adds ∫ xᵏ y dx of a straight line y between two nodes, by Simpson's rule, which is exact to the third power.
+/// Adds ∫ xᵏ y dx of a linear y between two nodes, by Simpson's rule, which is exact up to the third power.
 fn add(sums: &mut [f64; 3], [x0, x1]: [f64; 2], [y0, y1]: [f64; 2]) {
     let points = [(x0, y0), (0.5 * (x0 + x1), 2.0 * (y0 + y1)), (x1, y1)];
     for (x, weighted) in points {
@@ -82,7 +82,7 @@ mod tests {
         }
     }
 
-    /// One free electron per gram and mole scatters with 8π/3 rₑ² N_A = 0.4006 cm²/g.
+    /// One free electron per gram and mole has the cross section 8π/3 rₑ² N_A = 0.4006 cm²/g.
     #[test]
     fn constant_form_factor_gives_the_thomson_cross_section() {
         let integral = ThomsonIntegral::new(vec![0.0, 200.0], vec![1.0; 2]);

@@ -1,4 +1,4 @@
-//! The analog engine on projections of MC-GPU input files.
+//! Analog simulation of projections of MC-GPU input files.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -18,14 +18,14 @@ use crate::transport::tally::MOST_HISTORIES;
 use crate::transport::tracking::TransportError;
 
 impl Simulation {
-    /// Follows the photons of a projection one by one, and counts the doses that the input file asks for.
+    /// Follows the photons of a projection one by one and counts the doses that the input file requests.
     ///
-    /// `observe` receives the progress a few times per second and ends the run early by [`ControlFlow::Break`]; what was counted
-    /// until then is the result. Otherwise the result depends on seed and number of histories only;
-    /// how many fit into a time depends on the machine.
+    /// `observe` receives the progress a few times per second and ends the run early by [`ControlFlow::Break`]; the result is then
+    /// what was counted so far. Otherwise the result depends only on the seed and the number of histories, which with a time limit
+    /// depends on the machine.
     ///
     /// # Errors
-    /// [`TransportError`] when the geometry, the spectrum or the number of histories makes no sense.
+    /// [`TransportError`] if the geometry, the spectrum or the number of histories is invalid.
     pub fn analog(
         &self,
         station: &Station,
@@ -40,7 +40,7 @@ impl Simulation {
         Ok((tally.radiograph(), tally.dose()))
     }
 
-    /// The run of a projection, with the doses that the input file asks for; [`stop`] ends it.
+    /// Prepares the run of a projection, with the doses that the input file requests; [`stop`] ends it.
     pub(crate) fn analog_run<'a>(
         &'a self,
         station: &Station,
@@ -65,7 +65,7 @@ impl Simulation {
     }
 }
 
-/// When a run of this length ends before all its histories are followed.
+/// Stopping rule for a run of this length.
 pub(crate) fn stop(length: RunLength) -> Stop {
     Stop {
         time: match length {
@@ -103,11 +103,11 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// A damaged scan is refused, or its photons are followed to the end.
+        /// A damaged scan is either refused or simulated to the end.
         #[test]
         fn a_damaged_scan_is_followed_or_refused(damage in mangled::damage(), hurt in 0..3_usize) {
             let folder = tempfile::tempdir().unwrap();
-            // At most two injuries to one of the files: with more, few files are read.
+            // At most two changes to one of the files; with more, few files can be read.
             let damage = &damage[..damage.len().min(2)];
             let write = |index: usize, name: &str, text: &str| {
                 let path = folder.path().join(name);

@@ -1,4 +1,4 @@
-//! Doses of a whole scan, and the files that MC-GPU writes them to.
+//! Doses of an entire scan, and the files that MC-GPU writes them to.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -14,18 +14,18 @@ use crate::mcgpu::simulation::Simulation;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScanDoseError {
-    /// The sums were begun for another simulation.
+    /// The sums belong to another simulation.
     #[error(
         "the sums hold {} listed materials and {} voxels, but the simulation has {} and {}",
         found[0], found[1], expected[0], expected[1]
     )]
     Sums {
-        /// Listed materials and voxels of the sums.
+        /// Numbers of listed materials and voxels in the sums.
         found: [usize; 2],
-        /// Those of the simulation.
+        /// Numbers of listed materials and voxels in the simulation.
         expected: [usize; 2],
     },
-    /// Materials of another phantom.
+    /// The dose is for the materials of another phantom.
     #[error(
         "the dose is for the materials {found}, but the voxels of the simulation have {expected}"
     )]
@@ -35,7 +35,7 @@ pub enum ScanDoseError {
         /// Names of the phantom's materials.
         expected: String,
     },
-    /// Doses of other voxels than the input file asks for.
+    /// The dose is for other voxels than the input file requests.
     #[error(
         "the dose is for {}, but the input file requests {}",
         described(found),
@@ -44,7 +44,7 @@ pub enum ScanDoseError {
     Voxels {
         /// Voxels of the dose.
         found: Option<VoxelBox>,
-        /// Voxels asked for.
+        /// Voxels requested.
         expected: Option<VoxelBox>,
     },
 }
@@ -60,13 +60,13 @@ fn described(voxels: &Option<VoxelBox>) -> String {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanDose {
     histories: u64,
-    /// By line of the material list.
+    /// Sums by line of the material list.
     materials: Vec<Sum>,
     materials_mass_g: Vec<f64>,
     voxels: Vec<Sum>,
 }
 
-/// Energy of all histories, eV, and the square of its standard error.
+/// Energy of all histories, eV, and its squared standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Sum {
     ev: f64,
@@ -88,7 +88,7 @@ impl Sum {
 }
 
 impl Simulation {
-    /// The doses that the input file asks for; `None` if it asks for none.
+    /// The doses that the input file requests; `None` if there are none.
     pub fn dose_settings(&self) -> Option<DoseSettings> {
         let voxels = self.dose_box();
         (self.input().material_dose || voxels.is_some()).then(|| DoseSettings {
@@ -97,7 +97,7 @@ impl Simulation {
         })
     }
 
-    /// The voxels whose dose is asked for, cut at the border of the geometry as MC-GPU does.
+    /// The voxels whose dose is requested, clipped at the border of the geometry as in MC-GPU.
     pub(crate) fn dose_box(&self) -> Option<VoxelBox> {
         let size = self.phantom().grid().size();
         self.input().voxel_dose.as_ref().map(|dose| VoxelBox {
@@ -107,7 +107,7 @@ impl Simulation {
     }
 }
 
-/// Materials and voxels whose doses are summed.
+/// Numbers of materials and voxels whose doses are summed.
 fn sizes(simulation: &Simulation) -> [usize; 2] {
     let voxels = simulation.dose_box();
     let voxels = voxels.map_or(0, |voxels| voxels.size().iter().product());
@@ -115,7 +115,7 @@ fn sizes(simulation: &Simulation) -> [usize; 2] {
 }
 
 impl ScanDose {
-    /// No dose yet.
+    /// Empty sums.
     pub fn new(simulation: &Simulation) -> Self {
         let [listed, voxels] = sizes(simulation);
         Self {
@@ -126,11 +126,11 @@ impl ScanDose {
         }
     }
 
-    /// Adds what one projection left.
+    /// Adds the dose of one projection.
     ///
     /// # Errors
-    /// [`ScanDoseError`] if `dose` was not counted with [`Simulation::dose_settings`] of the same simulation, or if these sums were
-    /// begun for another one; they stay as they are.
+    /// [`ScanDoseError`] if `dose` was not counted with [`Simulation::dose_settings`] of the same simulation, or if these sums
+    /// belong to another one; the sums are then unchanged.
     pub fn add(&mut self, simulation: &Simulation, dose: &Dose) -> Result<(), ScanDoseError> {
         self.check(simulation, dose)?;
         let histories = dose.histories as f64;
@@ -150,7 +150,7 @@ impl ScanDose {
         Ok(())
     }
 
-    /// Refuses a dose of other materials or voxels than those of the simulation.
+    /// Checks that the dose has the materials and voxels of the simulation.
     fn check(&self, simulation: &Simulation, dose: &Dose) -> Result<(), ScanDoseError> {
         let (found, expected) = ([self.materials.len(), self.voxels.len()], sizes(simulation));
         if found != expected {
@@ -180,7 +180,7 @@ impl ScanDose {
         self.histories
     }
 
-    /// Energy and mass by line of the material list; zero for materials that no voxel has.
+    /// Energy and mass by line of the material list; zero for materials without voxels.
     pub fn materials(&self) -> Vec<Imparted> {
         let masses = self.materials_mass_g.iter();
         masses
@@ -192,12 +192,12 @@ impl ScanDose {
             .collect()
     }
 
-    /// Writes the voxel doses into `folder`, if the input file asks for them, under the name that it gives: the
-    /// plane at the height of the source as text, with `.raw` behind the name all voxels as 32-bit floats in eV/g per
-    /// history, and with `_PercentRelError2sigma.raw` twice their relative standard errors in percent. x runs fastest.
+    /// Writes the voxel doses into `folder`, if the input file requests them, under the name given there: the
+    /// plane at the height of the source as text; all voxels as 32-bit floats in eV/g per history, with `.raw` appended to
+    /// the name; and twice their relative standard errors in percent, with `_PercentRelError2sigma.raw` appended. x runs fastest.
     ///
-    /// MC-GPU divides by the histories of all projections, those outside the angles of interest included; these doses are
-    /// per history that was followed.
+    /// MC-GPU divides by the histories of all projections, including those outside the angles of interest; these doses are
+    /// per history followed.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -248,7 +248,7 @@ impl ScanDose {
         ]
     }
 
-    /// All sums, little-endian: histories (u64), then f64.
+    /// Serialises all sums, little-endian: histories (u64), then f64.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let sums = self.materials.iter().chain(&self.voxels);
         let sums = sums.flat_map(|sum| [sum.ev, sum.se_ev2]);
@@ -260,7 +260,7 @@ impl ScanDose {
             .collect()
     }
 
-    /// Doses of a scan of `simulation` from [`Self::to_bytes`]; `None` if their number is another one.
+    /// Reads the doses of a scan of `simulation` from [`Self::to_bytes`]; `None` if the number of bytes does not match.
     pub(crate) fn from_bytes(simulation: &Simulation, bytes: &[u8]) -> Option<Self> {
         let mut dose = Self::new(simulation);
         let (histories, numbers) = bytes.split_first_chunk()?;

@@ -7,7 +7,7 @@ use crate::image::output::OutputError;
 use crate::matter::material_error::MaterialError;
 use crate::phantom::voxels::PhantomError;
 
-/// Why an MC-GPU input file, or a file it names, cannot be used.
+/// Why an MC-GPU input file, or a file named in it, cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum McgpuError {
@@ -16,10 +16,10 @@ pub enum McgpuError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file system or of gzip.
         source: std::io::Error,
     },
-    /// A file that the input file names is not there.
+    /// A file named in the input file does not exist.
     #[error(
         "{}, line {line}: {what} {} is not a file{hint}", input.display(), file.display()
     )]
@@ -28,36 +28,36 @@ pub enum McgpuError {
         input: PathBuf,
         /// Line that names the file.
         line: u64,
-        /// What the file is for, such as `material file 3`.
+        /// Purpose of the file, such as `material file 3`.
         what: String,
         /// The file, resolved against the input file.
         file: PathBuf,
-        /// What could stand there instead; empty or a sub-clause.
+        /// Suggestion for the line; empty or a sub-clause.
         hint: &'static str,
     },
-    /// A line does not hold what it should.
+    /// A line does not contain the expected value.
     #[error("{}, line {line}: found {found:?}, expected {expected}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// The line, counted from 1.
+        /// Line number, from 1.
         line: u64,
-        /// What stands there, shortened.
+        /// Content of the line, shortened.
         found: String,
-        /// What should stand there.
+        /// Expected content.
         expected: String,
     },
-    /// The file is shorter than it should be.
+    /// The file ends too early.
     #[error("{} ends after line {line}, expected {expected}", path.display())]
     Ends {
         /// The file.
         path: PathBuf,
-        /// The last line.
+        /// Number of the last line.
         line: u64,
-        /// What should follow.
+        /// Expected next content.
         expected: String,
     },
-    /// A section of another version of MC-GPU.
+    /// A section belongs to another version of MC-GPU.
     #[error(
         "{}, line {line}: section {section} is from another version ({found:?}), expected {expected} as in MC-GPU v1.3",
         path.display()
@@ -65,16 +65,16 @@ pub enum McgpuError {
     Version {
         /// The input file.
         path: PathBuf,
-        /// The line of the headline.
+        /// Line of the headline.
         line: u64,
         /// Name of the section.
         section: &'static str,
         /// The headline.
         found: String,
-        /// Its version in MC-GPU v1.3.
+        /// Version of the section in MC-GPU v1.3.
         expected: &'static str,
     },
-    /// The header promises more voxels than the file can hold.
+    /// The header specifies more voxels than the file can hold.
     #[error(
         "{}: the header specifies {} x {} x {} voxels, but {bytes} bytes hold at most {most}",
         path.display(), size[0], size[1], size[2]
@@ -89,7 +89,7 @@ pub enum McgpuError {
         /// Voxels that a file of that length can hold.
         most: u64,
     },
-    /// The voxels do not fit into the memory.
+    /// The voxels do not fit into memory.
     #[error(
         "{}: {} x {} x {} voxels need at least {needed_mb} MB of memory, but {available_mb} MB are available",
         path.display(), size[0], size[1], size[2]
@@ -99,24 +99,24 @@ pub enum McgpuError {
         path: PathBuf,
         /// Voxels along x, y, z.
         size: [u64; 3],
-        /// Memory that they need, 10⁶ bytes.
+        /// Memory needed, 10⁶ bytes.
         needed_mb: u64,
-        /// Memory that there is, 10⁶ bytes.
+        /// Memory available, 10⁶ bytes.
         available_mb: u64,
     },
-    /// A voxel names a material that the input file does not list.
+    /// A voxel refers to a material that the input file does not list.
     #[error("{} uses material {found}, but {} lists only {listed}", path.display(), input.display())]
     MaterialNumber {
         /// The voxel file.
         path: PathBuf,
         /// The input file.
         input: PathBuf,
-        /// Highest material number of the voxels, counted from 1.
+        /// Highest material number of the voxels, from 1.
         found: u8,
-        /// Materials listed.
+        /// Number of materials listed.
         listed: usize,
     },
-    /// The voxels whose dose is asked for are not there.
+    /// The voxels whose dose is requested are outside the geometry.
     #[error(
         "{}: the dose region begins at voxel ({}, {}, {}), outside the geometry of {} x {} x {} voxels",
         path.display(), first[0], first[1], first[2], size[0], size[1], size[2]
@@ -124,12 +124,12 @@ pub enum McgpuError {
     DoseRegion {
         /// The input file.
         path: PathBuf,
-        /// First voxel, counted from 1.
+        /// First voxel, from 1.
         first: [usize; 3],
-        /// Voxels of the geometry.
+        /// Number of voxels of the geometry.
         size: [usize; 3],
     },
-    /// Photons at energies that the tables of a material do not cover.
+    /// The tables of a material do not cover the energies of the spectrum.
     #[error(
         "the spectrum {} extends from {low_kev} to {high_kev} keV, but {} only covers {table_low_kev} to {table_high_kev} keV",
         spectrum.display(), material.display()
@@ -148,36 +148,36 @@ pub enum McgpuError {
         /// Highest energy of the tables, keV.
         table_high_kev: f64,
     },
-    /// The numbers of a material file make no material.
+    /// The numbers of a material file are not a valid material.
     #[error("{} is not a usable material", path.display())]
     Material {
         /// The material file.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with the material.
         source: MaterialError,
     },
-    /// A `ppa:NAME` line names no material of the library.
+    /// The material of a `ppa:NAME` line is not in the library.
     #[error("{}, line {line}", input.display())]
     Named {
         /// The input file.
         input: PathBuf,
         /// Line that names the material.
         line: u64,
-        /// Why.
+        /// What is wrong with the name.
         source: MaterialError,
     },
-    /// The spectrum is not usable.
+    /// The spectrum is invalid.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
-    /// The voxels make no phantom.
+    /// The voxels are not a valid phantom.
     #[error("{} is not a usable geometry", path.display())]
     Phantom {
         /// The voxel file.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with the voxels.
         source: PhantomError,
     },
-    /// Oblong pixels that no small number of square ones makes up.
+    /// Oblong pixels cannot be divided into a small number of square ones.
     #[error(
         "{}: pixels of {width_cm} cm by {height_cm} cm, expected sides in a ratio of two integers of at most 32",
         path.display()

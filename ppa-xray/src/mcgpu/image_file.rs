@@ -20,8 +20,8 @@ pub struct McgpuImage {
 }
 
 impl McgpuImage {
-    /// Turns the rows of a radiograph round and averages its square pixels over those of MC-GPU, `per_pixel` columns and
-    /// rows to each.
+    /// Flips the rows of a radiograph and averages its square pixels over those of MC-GPU, each of `per_pixel` columns and
+    /// rows.
     pub(crate) fn new(radiograph: &Radiograph, per_pixel: [u32; 2]) -> Self {
         let [across, along] = per_pixel.map(|n| n as usize);
         let (columns, rows) = (radiograph.columns() / across, radiograph.rows() / along);
@@ -45,7 +45,7 @@ impl McgpuImage {
         }
     }
 
-    /// All energy per pixel.
+    /// Sum of all categories per pixel.
     pub fn total(&self) -> Vec<f32> {
         let [primary, compton, rayleigh, multiple] = &self.planes;
         primary
@@ -56,14 +56,14 @@ impl McgpuImage {
             .collect()
     }
 
-    /// Five planes of little-endian 32-bit floats: total, then the four.
+    /// Five planes of little-endian 32-bit floats: the total, then the four categories.
     fn raw(&self) -> Vec<u8> {
         let total = self.total();
         let planes = std::iter::once(&total).chain(&self.planes);
         planes.flatten().flat_map(|v| v.to_le_bytes()).collect()
     }
 
-    /// The four planes as columns; a blank line ends each row.
+    /// The four planes as text columns; a blank line ends each row.
     fn text(&self, header: &str, footer: &str) -> String {
         let mut text = header.to_owned();
         let [primary, compton, rayleigh, multiple] = &self.planes;
@@ -88,7 +88,7 @@ impl Simulation {
         McgpuImage::new(radiograph, self.square_pixels())
     }
 
-    /// Name of the image file of a projection: with several projections, four digits of its number follow.
+    /// Name of the image file of a projection. With several projections, four digits of the number are appended.
     pub fn image_name(&self, station: &Station) -> String {
         let name = &self.input().image_file;
         if self.input().trajectory.projections == 1 {
@@ -98,14 +98,14 @@ impl Simulation {
         }
     }
 
-    /// Names of both files of a projection: text, then raw.
+    /// Names of the two files of a projection: text, then raw.
     pub fn image_names(&self, station: &Station) -> [String; 2] {
         let name = self.image_name(station);
         let raw = format!("{name}.raw");
         [name, raw]
     }
 
-    /// Names of all files that a scan of these projections leaves: images, and voxel doses if the input file asks for them.
+    /// Names of all files written by a scan of these projections: images, and voxel doses if the input file requests them.
     pub fn file_names(&self, stations: &[Station]) -> Vec<String> {
         let mut names: Vec<String> = stations
             .iter()
@@ -123,11 +123,11 @@ impl Simulation {
     }
 
     /// Writes the image of a projection into `folder`, as text under [`Simulation::image_name`] and as 32-bit floats
-    /// with `.raw` behind that. Both appear whole or not at all.
+    /// with `.raw` appended to the name. Each file is written completely or not at all.
     ///
-    /// Scripts made for MC-GPU read them: text with four columns (non-scattered, Compton, Rayleigh, multiple) in eV/cm²
-    /// per history and a blank line after each row; raw with five planes, the total first. Run times are left out, so
-    /// that the same seed gives the same bytes.
+    /// Scripts made for MC-GPU can read them: text with four columns (non-scattered, Compton, Rayleigh, multiple) in eV/cm²
+    /// per history and a blank line after each row; raw with five planes, the total first. Run times are omitted, so
+    /// the same seed gives the same bytes.
     ///
     /// # Errors
     /// A file that cannot be written.

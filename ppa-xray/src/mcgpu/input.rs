@@ -8,15 +8,15 @@ use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::sections::{MaterialLine, RunLength, Trajectory, VoxelDose, all_lengths};
 use crate::mcgpu::values::{NamedFile, Values};
 
-/// What an input file says. Lengths in cm, in the frame of the voxel box: its corner with the lowest coordinates is the
+/// Contents of an input file. Lengths are in cm, in the frame of the voxel box, whose corner with the lowest coordinates is the
 /// origin.
 ///
-/// The numbers of the graphics card, its threads, and the histories per thread are ignored.
+/// The number of the graphics card, its threads, and the histories per thread are ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Input {
     /// The input file.
     pub path: PathBuf,
-    /// How long each projection runs.
+    /// Length of the run of each projection.
     pub run_length: RunLength,
     /// Seed of the random numbers.
     pub seed: u64,
@@ -26,38 +26,38 @@ pub struct Input {
     pub source_cm: Point3<f64>,
     /// Central beam of the first projection.
     pub direction: Unit<Vector3<f64>>,
-    /// Full apertures of the fan along the columns and along the rows of the detector, degrees; `None` when the field
+    /// Full apertures of the fan along the columns and along the rows of the detector, degrees; `None` if the field
     /// is exactly the detector.
     ///
-    /// The columns come first, as in the code of MC-GPU; its comment in the file ("polar and azimuthal") says otherwise.
+    /// The columns come first, as in the code of MC-GPU; its comment in the file ("polar and azimuthal") is wrong.
     pub apertures_deg: Option<[f64; 2]>,
     /// Name of the image file to write.
     pub image_file: String,
     /// Pixels along the columns (across the beam in the xy plane) and the rows (along z).
     pub pixels: [u32; 2],
-    /// Extent of the detector, columns and rows.
+    /// Extent of the detector along columns and rows.
     pub detector_cm: [f64; 2],
-    /// From the source to the centre of the detector, along the central beam.
+    /// Distance from the source to the centre of the detector, along the central beam.
     pub source_detector_cm: f64,
     /// The scan.
     pub trajectory: Trajectory,
-    /// Whether the energy in every material is asked for.
+    /// Whether the energy in every material is requested.
     pub material_dose: bool,
-    /// Voxels whose dose is asked for.
+    /// Voxels whose dose is requested.
     pub voxel_dose: Option<VoxelDose>,
     /// The geometry, penEasy `.vox` or `.vox.gz`.
     pub voxels: NamedFile,
-    /// Materials; the voxels count them from 1.
+    /// Materials; the voxels number them from 1.
     pub materials: Vec<MaterialLine>,
 }
 
 impl Input {
-    /// Reads an input file; the files that it names are looked at later.
+    /// Reads an input file. The files named in it are not read yet.
     ///
-    /// Text after `#` and lines without anything else say nothing. Sections stand in the order of MC-GPU.
+    /// Text after `#` and blank lines are ignored. Sections are in the order of MC-GPU.
     ///
     /// # Errors
-    /// [`McgpuError`] naming file, line, what was found and what expected.
+    /// [`McgpuError`] naming the file, the line, what was found and what was expected.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, McgpuError> {
         let path = path.as_ref();
         let mut values = Values::open(path)?;
@@ -257,7 +257,7 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Whatever a damaged file holds, reading ends in an input or an error.
+        /// Reading a damaged file returns an input or an error, whatever its content.
         #[test]
         fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
             let _ = read(&mangled::damaged(SAMPLE.as_bytes(), &damage));

@@ -7,18 +7,18 @@ use flate2::read::MultiGzDecoder;
 
 use crate::mcgpu::error::McgpuError;
 
-/// Bytes read at once.
+/// Number of bytes read at once.
 const CHUNK: usize = 1 << 20;
 
-/// Longest line taken for text; MC-GPU itself stops at 250 bytes.
+/// Longest line that is accepted as text; MC-GPU itself stops at 250 bytes.
 const LONGEST_LINE: usize = 4_096;
 
-/// Reads a file line by line in constant memory. gzip is known by its first two bytes, as zlib does, not by the name.
+/// Reads a file line by line in constant memory. gzip is detected by its first two bytes, as in zlib, not by the name.
 pub(crate) struct Lines {
     path: PathBuf,
     reader: Box<dyn Read>,
     buffer: Vec<u8>,
-    /// The part of the buffer that has not been handed out.
+    /// The part of the buffer that has not been returned.
     pending: std::ops::Range<usize>,
     ended: bool,
     number: u64,
@@ -60,7 +60,7 @@ impl Lines {
         })
     }
 
-    /// The next line without its line feed; `None` at the end of the file.
+    /// Returns the next line without its line feed; `None` at the end of the file.
     #[inline]
     pub fn next(&mut self) -> Result<Option<&[u8]>, McgpuError> {
         loop {
@@ -111,23 +111,23 @@ impl Lines {
         &self.path
     }
 
-    /// Number of the line read last, counted from 1.
+    /// Number of the last line read, from 1.
     pub fn number(&self) -> u64 {
         self.number
     }
 
-    /// Most bytes of text that the file can hold; deflate packs 1032 bytes into one at best.
+    /// Upper limit of the bytes of text in the file; the compression ratio of deflate is at most 1032.
     pub fn most_text_bytes(&self) -> u64 {
         self.bytes
             .saturating_mul(if self.compressed { 1_032 } else { 1 })
     }
 
-    /// Length of the file as it lies on the disk.
+    /// Length of the file on disk.
     pub fn file_bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// The error for a line that holds `found`.
+    /// Returns the error for a line that contains `found`.
     pub fn unexpected(&self, found: &[u8], expected: impl Into<String>) -> McgpuError {
         let shown = &found[..found.len().min(60)];
         McgpuError::Line {
@@ -138,7 +138,7 @@ impl Lines {
         }
     }
 
-    /// The error for a file that ends here.
+    /// Returns the error for a file that ends here.
     pub fn ends(&self, expected: impl Into<String>) -> McgpuError {
         McgpuError::Ends {
             path: self.path.clone(),
@@ -148,16 +148,16 @@ impl Lines {
     }
 }
 
-/// Columns of a line, parted by blanks.
+/// Columns of a line, separated by blanks.
 #[inline]
 pub(crate) fn columns(line: &[u8]) -> impl Iterator<Item = &str> {
     line.split(u8::is_ascii_whitespace)
         .filter(|column| !column.is_empty())
-        // What is not a text is not a number either; no number begins with this mark.
+        // Bytes that are not text are not a number either; no number begins with this character.
         .map(|column| std::str::from_utf8(column).unwrap_or("\u{FFFD}"))
 }
 
-/// The first `N` columns of a line as numbers.
+/// Parses the first `N` columns of a line as numbers.
 pub(crate) fn numbers<const N: usize>(line: &[u8]) -> Option<[f64; N]> {
     let mut columns = columns(line);
     let mut numbers = [0.0; N];
@@ -167,7 +167,7 @@ pub(crate) fn numbers<const N: usize>(line: &[u8]) -> Option<[f64; N]> {
     Some(numbers)
 }
 
-/// Whether `line` holds `text`.
+/// Whether `line` contains `text`.
 pub(crate) fn holds(line: &[u8], text: &str) -> bool {
     line.windows(text.len()).any(|part| part == text.as_bytes())
 }

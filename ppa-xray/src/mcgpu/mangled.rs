@@ -1,28 +1,28 @@
-//! Damaged files, to test the parsers with.
+//! Damaged files for testing the parsers.
 
 use std::io::Write;
 use std::path::Path;
 
 use proptest::prelude::*;
 
-/// One injury to a text file.
+/// One change to a text file.
 #[derive(Debug, Clone)]
 pub(crate) enum Damage {
     /// Keeps a share of the bytes.
     Truncate(f64),
     /// Flips one bit.
     Flip(f64, u8),
-    /// Puts a word in place of another.
+    /// Replaces a word by another.
     Word(f64, &'static str),
     /// Swaps two lines.
     Swap(f64, f64),
-    /// Leaves a line out.
+    /// Removes a line.
     Drop(f64),
-    /// Says a line twice.
+    /// Repeats a line.
     Double(f64),
 }
 
-/// Up to five injuries.
+/// Up to five changes.
 pub(crate) fn damage() -> impl Strategy<Value = Vec<Damage>> {
     let words = proptest::sample::select(&[
         "NaN",
@@ -53,7 +53,7 @@ pub(crate) fn damage() -> impl Strategy<Value = Vec<Damage>> {
     proptest::collection::vec(one, 0..6)
 }
 
-/// `text` with its injuries, one after the other.
+/// Applies the changes to `text`, one after the other.
 pub(crate) fn damaged(text: &[u8], damage: &[Damage]) -> Vec<u8> {
     let mut bytes = text.to_vec();
     for injury in damage {
@@ -101,7 +101,7 @@ pub(crate) fn damaged(text: &[u8], damage: &[Damage]) -> Vec<u8> {
     bytes
 }
 
-/// What a reader says of `sample` with one piece of it changed.
+/// Returns the error of a reader for `sample` with one piece of it changed.
 pub(crate) fn report<T: std::fmt::Debug, E: std::fmt::Display>(
     sample: &str,
     [from, to]: [&str; 2],
@@ -115,7 +115,7 @@ pub(crate) fn report<T: std::fmt::Debug, E: std::fmt::Display>(
     }
 }
 
-/// Reads a file with these bytes.
+/// Calls `reader` on a file with these bytes.
 pub(crate) fn read<T>(bytes: &[u8], reader: impl FnOnce(&Path) -> T) -> T {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(bytes).unwrap();

@@ -9,10 +9,10 @@ use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::material_lines::MaterialFile;
 use crate::mcgpu::rational_inverse::density_in_interval;
 
-/// Most energies that a file may hold; MC-GPU itself stops at 25005.
+/// Largest number of energies in a file; MC-GPU itself stops at 25005.
 const MOST_ENERGIES: usize = 200_000;
 
-/// Most nodes of the form factor and most shells.
+/// Largest number of nodes of the form factor, and of shells.
 const MOST_NODES: usize = 10_000;
 
 /// Squared momentum transfer, 1/Å², beyond that of any photon below 150 keV, which is (150 keV / hc)².
@@ -20,12 +20,12 @@ const LARGEST_X: f64 = 146.5;
 
 /// Reads a material: mean free paths, squared molecular form factor, shells with their Compton profiles.
 ///
-/// The densities of the voxels scale the mean free paths; the one of the file is nominal. The form factor is the
-/// derivative of the rational inverse cumulative distribution that MC-GPU samples. The table that helps its search (ITL,
+/// The mean free paths are scaled by the densities of the voxels; the density in the file is nominal. The form factor is the
+/// derivative of the rational inverse cumulative distribution that MC-GPU samples. The table that speeds up its search (ITL,
 /// ITU) and the largest cumulative probability of each energy follow from the rest and are ignored.
 ///
 /// # Errors
-/// [`McgpuError`] naming line, what was found and what expected, and mean free paths that contradict their total.
+/// [`McgpuError`] naming the line, what was found and what was expected, or mean free paths that contradict their total.
 pub fn read_material(path: impl AsRef<Path>) -> Result<Material, McgpuError> {
     let mut file = MaterialFile::open(path.as_ref())?;
     let name = file.name()?;
@@ -185,7 +185,7 @@ mod tests {
         .unwrap();
         let last = nodes[59];
         for (index, &x) in nodes.iter().enumerate() {
-            // The parameters that give the interval the density of F² at both ends.
+            // The parameters for which the density of the interval is F² at both ends.
             let (a, b) = nodes.get(index + 1).map_or((0.0, 0.0), |&next| {
                 let slope = (cumulative(next) - cumulative(x)) / (next - x);
                 let density = |x: f64| (1.0 + x).powi(-2);
@@ -228,13 +228,13 @@ mod tests {
                 assert!((found / expected - 1.0).abs() < 1e-7);
             }
         }
-        // The sampling table gives back the form factor that it was made of, to the error of interpolation.
+        // The sampling table reproduces the form factor that it was made from, to the error of interpolation.
         let at_zero = found.form_factor_squared_per_gram(0.0);
         for q in [0.01, 0.1, 0.5, 1.0, 3.0, 12.0] {
             let ratio = found.form_factor_squared_per_gram(q) / at_zero * (1.0 + q * q).powi(2);
             assert!((ratio - 1.0).abs() < 5e-3, "{q}: {ratio}");
         }
-        // Far out every electron scatters; near zero only those that are loosely bound.
+        // At large q every electron scatters; near zero only loosely bound ones do.
         let electrons = |q| found.incoherent_per_gram(q) / found.incoherent_per_gram(1e3);
         assert!(electrons(0.5) < 0.5 && electrons(20.0) > 0.99);
     }
@@ -286,7 +286,7 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Whatever a damaged file holds, reading ends in a material or an error.
+        /// Reading a damaged file returns a material or an error, whatever its content.
         #[test]
         fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
             let water = Material::named("water").unwrap();

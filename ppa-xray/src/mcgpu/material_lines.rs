@@ -1,11 +1,11 @@
-//! Lines of a material file: headlines, numbers behind `#`, rows of a table.
+//! Lines of a material file: headlines, numbers after `#`, rows of a table.
 
 use std::path::Path;
 
 use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::lines::{Lines, holds, numbers};
 
-/// A material file, on its way from section to section.
+/// Reads a material file section by section.
 pub(super) struct MaterialFile(Lines);
 
 impl MaterialFile {
@@ -18,7 +18,7 @@ impl MaterialFile {
         line.ok_or_else(|| self.0.ends(expected))
     }
 
-    /// Goes on to the line that holds `headline`.
+    /// Skips to the line that contains `headline`.
     pub fn seek(&mut self, headline: &str) -> Result<(), McgpuError> {
         loop {
             match self.0.next()? {
@@ -29,7 +29,7 @@ impl MaterialFile {
         }
     }
 
-    /// A number behind `#`.
+    /// Reads a number after `#`.
     pub fn counted(&mut self, expected: &str) -> Result<f64, McgpuError> {
         let line = self.line(expected)?;
         let number = line
@@ -75,7 +75,7 @@ impl MaterialFile {
         }
     }
 
-    /// The error for a line that holds `found`.
+    /// Returns the error for a line that contains `found`.
     pub fn unexpected(&self, found: &[u8], expected: String) -> McgpuError {
         self.0.unexpected(found, expected)
     }

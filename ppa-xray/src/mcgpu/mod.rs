@@ -1,8 +1,8 @@
-//! Input files of MC-GPU v1.3 (Badal and Badano, Med. Phys. 36:4878, 2009, doi:10.1118/1.3231824) as they are.
+//! Unmodified input files of MC-GPU v1.3 (Badal and Badano, Med. Phys. 36:4878, 2009, doi:10.1118/1.3231824).
 //!
-//! [`Simulation::read`] takes an input file and all that it names: penEasy geometry (`.vox`), materials (`.mcgpu`), spectrum (`.spc`),
-//! detector, scan, doses; text or gzip. Paths resolve against the folder of the input file. A material line `ppa:NAME` stands
-//! for a material of this library ([`Material::named`](crate::Material::named)). Results have the layout of MC-GPU's.
+//! [`Simulation::read`] reads an input file and all files named in it: penEasy geometry (`.vox`), materials (`.mcgpu`), spectrum
+//! (`.spc`), detector, scan, doses; text or gzip. Paths are relative to the folder of the input file. A material line `ppa:NAME` means
+//! a material of this library ([`Material::named`](crate::Material::named)). Results have the layout of MC-GPU.
 //!
 //! Deliberate differences from MC-GPU are listed in `docs/physics.md`, section "Agreement with other codes".
 

@@ -1,4 +1,4 @@
-//! Parts of a scan: each follows its share of the histories of every projection and leaves a tally of each.
+//! Parts of a scan: each follows its share of the histories of every projection and writes a tally for each.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -20,19 +20,19 @@ use crate::run::progress::{Progress, Stop, Stopped};
 pub struct ScanPart<'a> {
     /// Histories of each projection, in all parts together.
     pub histories: u64,
-    /// Which part.
+    /// The part to follow.
     pub part: Part,
-    /// Where its tallies lie.
+    /// Folder of its tallies.
     pub folder: &'a Path,
     /// Whether a tally that cannot be continued is replaced.
     pub replace: bool,
 }
 
 impl Simulation {
-    /// Bytes of the tallies that a part still lacks.
+    /// Number of bytes of the tallies that a part still has to write.
     ///
     /// # Errors
-    /// [`ScanError`] if the exposure makes no sense.
+    /// [`ScanError`] if the exposure is invalid.
     pub fn missing_part_bytes(&self, scan_part: &ScanPart) -> Result<u64, ScanError> {
         let stations = self.input().stations();
         let is_missing = |station: &&Station| !Self::part_tally(scan_part.folder, station).exists();
@@ -46,19 +46,19 @@ impl Simulation {
         Ok(run.tally(scan_part.part).file_bytes() * missing.len() as u64)
     }
 
-    /// The tally of a projection in the folder of a part.
+    /// Path of the tally of a projection in the folder of a part.
     pub fn part_tally(folder: &Path, station: &Station) -> PathBuf {
         folder.join(format!("projection_{:04}.tally", station.number))
     }
 
-    /// Follows the histories of a part of a projection, and the doses asked for, into [`Self::part_tally`] of the folder. A tally
-    /// that is there continues; it is written every `save_every`, at the end, and when `observe` ends the run by
+    /// Follows the histories of a part of a projection, and counts the requested doses, into [`Self::part_tally`] of the folder. An
+    /// existing tally is continued; it is written every `save_every`, at the end, and when `observe` ends the run by
     /// [`ControlFlow::Break`].
     ///
-    /// Returns whether all histories of the part are followed.
+    /// Returns whether all histories of the part have been followed.
     ///
     /// # Errors
-    /// [`ScanError`] if the exposure makes no sense, or the tally cannot be read or written or is of another scan or part.
+    /// [`ScanError`] if the exposure is invalid, or if the tally cannot be read or written or belongs to another scan or part.
     pub fn follow_part(
         &self,
         station: &Station,
@@ -102,10 +102,10 @@ impl Simulation {
         Ok(ended == Stopped::Complete)
     }
 
-    /// A projection of `histories` histories from the folders of all its parts, in any order.
+    /// Merges a projection of `histories` histories from the folders of all its parts, in any order.
     ///
     /// # Errors
-    /// [`ScanError`] if a tally is missing, damaged, unfinished or of another scan, or if parts overlap or leave a hole.
+    /// [`ScanError`] if a tally is missing, damaged, unfinished or of another scan, or if parts overlap or leave a gap.
     pub fn merge_parts(
         &self,
         station: &Station,

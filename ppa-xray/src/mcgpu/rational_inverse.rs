@@ -3,7 +3,7 @@
 /// Points per interval.
 const POINTS: usize = 4;
 
-/// Abscissae and densities in the interval from x₀, up to which the cumulative probability is P₀, to x₁; a and b are its
+/// Abscissae and densities in the interval from x₀, where the cumulative probability is P₀, to x₁; a and b are its
 /// parameters. The point at x₁ belongs to the next interval.
 ///
 /// In an interval of width Δx and probability ΔP, x = x₀ + (1 + a + b) η / (1 + aη + bη²) Δx for uniform η, so that

@@ -1,4 +1,4 @@
-//! A scan that can be interrupted: its complete projections, the sums of the one under way, and the file that keeps both.
+//! A scan that can be interrupted: its complete projections, the sums of the running one, and the file that stores both.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -41,16 +41,16 @@ pub struct CompleteProjection {
     pub number: u32,
     /// Energy on the detector, eV per history.
     pub sums: CategorySums,
-    /// Histories followed (analog) or whose noise the image carries (fast).
+    /// Histories that were followed (analog) or that the noise of the image represents (fast).
     pub histories: f64,
 }
 
-/// The projections of an input file, written into a folder one by one.
+/// The projections of an input file, written to a folder one by one.
 ///
-/// The file [`Scan::tally_path`] keeps what an interrupted scan needs: the SHA-256 of the files of complete projections, the
-/// sums of their doses, and the [`AnalogTally`] of the projection under way. With a number of histories, a scan that was
-/// interrupted and resumed writes the same bytes as one that was not. With a time limit, the time of the projection under
-/// way begins again.
+/// The file [`Scan::tally_path`] stores what is needed to resume an interrupted scan: the SHA-256 of the files of complete projections,
+/// the sums of their doses, and the [`AnalogTally`] of the running projection. With a number of histories, a scan that was
+/// interrupted and resumed writes the same bytes as one that was not. With a time limit, the time of the running projection
+/// starts again.
 #[derive(Debug)]
 pub struct Scan<'a> {
     simulation: &'a Simulation,
@@ -75,7 +75,7 @@ struct Header {
 }
 
 impl<'a> Scan<'a> {
-    /// A scan of which nothing is simulated; files go to `folder`.
+    /// A new scan; files go to `folder`.
     pub fn new(
         simulation: &'a Simulation,
         length: RunLength,
@@ -97,10 +97,10 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// The scan that was interrupted in `folder`.
+    /// Resumes the scan that was interrupted in `folder`.
     ///
     /// # Errors
-    /// [`ScanError`] if the tally file cannot be read, is damaged, or is of another scan.
+    /// [`ScanError`] if the tally file cannot be read, is damaged, or belongs to another scan.
     pub fn resume(
         simulation: &'a Simulation,
         length: RunLength,
@@ -132,13 +132,13 @@ impl<'a> Scan<'a> {
         Ok(scan)
     }
 
-    /// The file that keeps an interrupted scan: `.tally` behind the name that the input file gives the images.
+    /// The file that stores an interrupted scan: `.tally` appended to the image name in the input file.
     pub fn tally_path(&self) -> PathBuf {
         let name = &self.simulation.input().image_file;
         self.folder.join(format!("{name}.tally"))
     }
 
-    /// Names of the files in the folder that hold what this scan wrote.
+    /// Names of the files in the folder whose content was written by this scan.
     pub fn written(&self) -> BTreeSet<String> {
         let files = self.files.iter();
         files
@@ -149,18 +149,18 @@ impl<'a> Scan<'a> {
             .collect()
     }
 
-    /// All complete projections, in the order in which they were completed.
+    /// All complete projections, in the order of completion.
     pub fn complete(&self) -> &[CompleteProjection] {
         &self.complete
     }
 
-    /// What a projection left, if it is complete.
+    /// Results of a projection, if it is complete.
     pub fn projection(&self, station: &Station) -> Option<&CompleteProjection> {
         let mut complete = self.complete.iter();
         complete.find(|projection| projection.number == station.number)
     }
 
-    /// How long a projection runs: one that is complete as long as it did.
+    /// Length of the run of a projection; for a complete one, the length that it had.
     pub fn length(&self, station: &Station) -> RunLength {
         match self.projection(station) {
             Some(projection) => RunLength::Histories(projection.histories as u64),
@@ -168,13 +168,13 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Follows the photons of a projection and counts the doses asked for. The histories of an interrupted projection
-    /// count; the tally file keeps them every `save_every` and when `observe` ends the run by [`ControlFlow::Break`].
+    /// Follows the photons of a projection and counts the requested doses. Continues the histories of an interrupted projection;
+    /// the tally file is written every `save_every` and when `observe` ends the run by [`ControlFlow::Break`].
     ///
-    /// A complete projection is simulated again, without changing the tally file. `None` if `observe` ended the run.
+    /// A complete projection is simulated again without changing the tally file. Returns `None` if `observe` ended the run.
     ///
     /// # Errors
-    /// [`ScanError`] if the exposure makes no sense, or the tally file cannot be written.
+    /// [`ScanError`] if the exposure is invalid, or if the tally file cannot be written.
     pub fn analog(
         &mut self,
         station: &Station,
@@ -217,7 +217,7 @@ impl<'a> Scan<'a> {
     ///
     /// # Errors
     /// [`ScanError`] if a file cannot be written, or if `dose` was not counted with [`Simulation::dose_settings`] of the same
-    /// simulation; nothing is added then.
+    /// simulation; then nothing is added.
     pub fn add(
         &mut self,
         station: &Station,
@@ -237,7 +237,7 @@ impl<'a> Scan<'a> {
         self.write(&self.simulation.image_files(station, radiograph))
     }
 
-    /// Writes the doses that the input file asks for and removes the tally file.
+    /// Writes the doses that the input file requests and removes the tally file.
     ///
     /// # Errors
     /// [`ScanError`] if a file cannot be written or removed.
@@ -250,7 +250,7 @@ impl<'a> Scan<'a> {
         Ok(self.dose)
     }
 
-    /// Writes files, whose hashes are kept before: a file that appears is known as one of this scan.
+    /// Writes files after saving their hashes, so every existing file is known to belong to this scan.
     fn write(&mut self, files: &[(String, Vec<u8>)]) -> Result<(), ScanError> {
         for (name, bytes) in files {
             self.files.insert(name.clone(), sha256(bytes));
@@ -284,7 +284,8 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// SHA-256, in hexadecimal, of all that decides the bytes of a scan's files. Paths and comments of the input file are no part of it.
+/// SHA-256, in hexadecimal, of everything that determines the bytes of a scan's files. Paths and comments of the input file are not
+/// included.
 fn scan_key(simulation: &Simulation, length: RunLength, engine: Engine) -> String {
     let input = simulation.input();
     let stations = input.stations();
@@ -318,7 +319,7 @@ fn scan_key(simulation: &Simulation, length: RunLength, engine: Engine) -> Strin
     sha256(format!("{exposure:?} {rest}").as_bytes())
 }
 
-/// In hexadecimal.
+/// SHA-256 in hexadecimal.
 fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }

@@ -8,7 +8,7 @@ use crate::run::analog_run::RunError;
 use crate::run::tally_error::TallyError;
 use crate::transport::tracking::TransportError;
 
-/// Why a scan cannot be resumed, simulated or kept.
+/// Why a scan cannot be resumed, simulated or stored.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScanError {
@@ -24,13 +24,13 @@ pub enum ScanError {
         /// The tally file.
         path: PathBuf,
     },
-    /// The exposure makes no sense.
+    /// The exposure is invalid.
     #[error(transparent)]
     Transport(#[from] TransportError),
     /// The histories of a projection cannot be followed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A dose of another simulation.
+    /// The dose belongs to another simulation.
     #[error(transparent)]
     Dose(#[from] ScanDoseError),
     /// An image or dose file cannot be written.
@@ -41,7 +41,7 @@ pub enum ScanError {
     Remove {
         /// The tally file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file system.
         source: std::io::Error,
     },
 }

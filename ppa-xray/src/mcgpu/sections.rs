@@ -11,13 +11,13 @@ use crate::mcgpu::values::Values;
 /// Numbers below this are seconds, not histories.
 const SECONDS_BELOW: f64 = 1e5;
 
-/// Most materials that one byte per voxel can name.
+/// Largest number of materials for one byte per voxel.
 const MATERIALS: usize = 255;
 
-/// Most projections; a helical scan of ten turns with one per degree needs fewer.
+/// Largest number of projections; a helical scan of ten turns with one projection per degree needs fewer.
 const PROJECTIONS: u32 = 10_000;
 
-/// How long each projection runs.
+/// Length of the run of each projection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RunLength {
     /// Photons emitted into the field.
@@ -29,30 +29,30 @@ pub enum RunLength {
 /// The path of source and detector around an axis along z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trajectory {
-    /// Projections of the whole scan; with 1 the other fields mean nothing.
+    /// Projections of the entire scan; with 1 the other fields are not used.
     pub projections: u32,
-    /// Turn from one projection to the next, degrees, from x towards y.
+    /// Rotation from one projection to the next, degrees, from x towards y.
     pub step_deg: f64,
-    /// Projections at other angles are left out; the angle of the source as seen from the axis, 0 along x.
+    /// Range of projections to simulate, by the angle of the source as seen from the axis, 0 along x.
     pub angles_of_interest_deg: [f64; 2],
-    /// Distance of the source from the axis, which the first central beam meets, cm.
+    /// Distance of the source from the axis, which intersects the first central beam, cm.
     pub source_axis_cm: f64,
     /// Rise along z from one projection to the next, cm.
     pub rise_cm: f64,
 }
 
-/// The box of voxels whose dose is asked for.
+/// The box of voxels whose dose is requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelDose {
     /// Name of the file to write.
     pub file: String,
-    /// First voxel along x, y, z, counted from 0.
+    /// First voxel along x, y, z, from 0.
     pub first: [usize; 3],
-    /// Last voxel along x, y, z, counted from 0; it belongs to the box.
+    /// Last voxel along x, y, z, from 0, inclusive.
     pub last: [usize; 3],
 }
 
-/// Where the data of a material come from.
+/// Source of the data of a material.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MaterialSource {
     /// An MC-GPU material file, `.mcgpu` or `.mcgpu.gz`.
@@ -64,13 +64,13 @@ pub enum MaterialSource {
 /// A line of the material list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaterialLine {
-    /// Line of the input file, counted from 1.
+    /// Line of the input file, from 1.
     pub line: u64,
-    /// What it names.
+    /// Material named in the line.
     pub source: MaterialSource,
 }
 
-/// A length of at most a kilometre in either direction.
+/// Whether lengths are at most a kilometre in either direction.
 pub(super) fn all_lengths<const N: usize>(lengths_cm: [f64; N]) -> bool {
     lengths_cm.iter().all(|length| length.abs() <= 1e5)
 }
@@ -95,7 +95,7 @@ impl Values {
         let [projections] = self.number(&expected, |[n]| {
             (0.0..=f64::from(PROJECTIONS)).contains(&n) && n.fract() == 0.0
         })?;
-        // MC-GPU takes none for one.
+        // MC-GPU treats 0 as 1.
         let projections = projections.max(1.0) as u32;
         if projections == 1 {
             return Ok(Trajectory {

@@ -1,4 +1,4 @@
-//! An MC-GPU input file and all files it names.
+//! An MC-GPU input file and all files named in it.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ use crate::mcgpu::voxel_file::VoxelFile;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::stream::Stream;
 
-/// Most square pixels that a side of an oblong one is cut into.
+/// Largest number of square pixels along a side of an oblong one.
 const MOST_PARTS: u32 = 32;
 
-/// Narrowest field, mm on the detector: a pencil or fan beam without width.
+/// Smallest field, mm on the detector, for a pencil or fan beam without width.
 const NARROWEST_MM: f64 = 1e-3;
 
 /// An input file of MC-GPU v1.3 with its geometry, materials and spectrum, ready to run.
@@ -58,20 +58,20 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Reads an input file and all that it names; paths resolve against its folder.
+    /// Reads an input file and all files named in it; paths are relative to its folder.
     ///
-    /// As in MC-GPU, material files that no voxel needs must be there but are not read.
+    /// As in MC-GPU, material files that no voxel needs must exist but are not read.
     ///
     /// # Errors
-    /// [`McgpuError`] naming the file, the line, what was found and what expected.
+    /// [`McgpuError`] naming the file, the line, what was found and what was expected.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, McgpuError> {
         Self::with_input(Input::read(path)?)
     }
 
-    /// The files named by an input that has been read before, and perhaps changed.
+    /// Reads the files named in an input that was already read, and possibly changed.
     ///
     /// # Errors
-    /// As [`Simulation::read`].
+    /// The same as [`Simulation::read`].
     pub fn with_input(input: Input) -> Result<Self, McgpuError> {
         let square_pixels = square_pixels(&input)?;
         check_files(&input)?;
@@ -117,7 +117,7 @@ impl Simulation {
         })
     }
 
-    /// What the input file says.
+    /// Contents of the input file.
     pub fn input(&self) -> &Input {
         &self.input
     }
@@ -127,14 +127,14 @@ impl Simulation {
         &self.phantom
     }
 
-    /// The energies of the photons.
+    /// Energies of the photons.
     pub fn spectrum(&self) -> &Spectrum {
         &self.spectrum
     }
 
     /// The exposure at one of [`Input::stations`].
     ///
-    /// Oblong pixels are cut into square ones, which [`Simulation::image`] puts together again.
+    /// Oblong pixels are divided into square ones, which [`Simulation::image`] merges again.
     pub fn projection(&self, station: &Station) -> Projection {
         let input = &self.input;
         let [across, along] = self.square_pixels;
@@ -161,12 +161,12 @@ impl Simulation {
         }
     }
 
-    /// Takes another seed than that of the file.
+    /// Replaces the seed of the file.
     pub fn set_seed(&mut self, seed: u64) {
         self.input.seed = seed;
     }
 
-    /// Seed of a projection: that of the file for the first one, and unrelated ones for the others.
+    /// Seed of a projection: that of the file for the first one, and independent ones for the others.
     pub fn seed(&self, station: &Station) -> u64 {
         if station.number == 0 {
             return self.input.seed;
@@ -188,7 +188,7 @@ impl Simulation {
     }
 }
 
-/// Every file must be there before any is read.
+/// Checks that every file exists before any is read.
 fn check_files(input: &Input) -> Result<(), McgpuError> {
     let mut files = vec![
         (
@@ -227,7 +227,7 @@ fn check_files(input: &Input) -> Result<(), McgpuError> {
     }
 }
 
-/// The material in a line of the list, with tables for all photons of the spectrum.
+/// Reads the material in a line of the list and checks that its tables cover the spectrum.
 fn material(input: &Input, index: usize, spectrum: &Spectrum) -> Result<Material, McgpuError> {
     let listed = &input.materials[index];
     let path = match &listed.source {
@@ -256,7 +256,7 @@ fn material(input: &Input, index: usize, spectrum: &Spectrum) -> Result<Material
     Ok(material)
 }
 
-/// Parts along columns and rows that make the pixels square.
+/// Numbers of parts along columns and rows that make the pixels square.
 fn square_pixels(input: &Input) -> Result<[u32; 2], McgpuError> {
     let [width_cm, height_cm] = [0, 1].map(|i| input.detector_cm[i] / f64::from(input.pixels[i]));
     (1..=MOST_PARTS)

@@ -6,7 +6,7 @@ use nalgebra::{
 
 use crate::mcgpu::input::Input;
 
-/// Slack of the angles of interest, degrees, as in MC-GPU.
+/// Tolerance of the angles of interest, degrees, as in MC-GPU.
 const SLACK_DEG: f64 = 1e-5;
 
 /// Source and detector of one projection.
@@ -14,23 +14,23 @@ const SLACK_DEG: f64 = 1e-5;
 pub struct Station {
     /// Number of the projection in the whole scan, from 0.
     pub number: u32,
-    /// Angle of the source as seen from the axis, degrees; 0 is along x, 90 along y. Not reduced to one turn.
+    /// Angle of the source as seen from the axis, degrees; 0 is along x, 90 along y. Not reduced to one revolution.
     pub angle_deg: f64,
     /// Focal spot, cm.
     pub source_cm: Point3<f64>,
-    /// Central beam.
+    /// Direction of the central beam.
     pub direction: Unit<Vector3<f64>>,
 }
 
 impl Input {
-    /// The projections whose angles are of interest; one exposure without a scan is always.
+    /// The projections within the angles of interest. A single exposure without a scan is always included.
     ///
-    /// The first one is that of the input file. The source then turns about an axis along z that the first central beam
-    /// meets, and rises; the beam keeps pointing at the axis.
+    /// The first one is that of the input file. The source then rotates about an axis along z that intersects the first central beam,
+    /// and rises; the beam keeps pointing at the axis.
     pub fn stations(&self) -> Vec<Station> {
         let trajectory = &self.trajectory;
         let [u, v, _] = self.direction.into_inner().into();
-        // The source lies opposite to where the beam goes.
+        // The source is opposite to the direction of the beam.
         let first_deg = (-v).atan2(-u).to_degrees().rem_euclid(360.0);
         if trajectory.projections == 1 {
             return vec![Station {
@@ -69,12 +69,12 @@ impl Input {
 impl Station {
     /// Pose of the device in the frame of the voxel box, in mm.
     ///
-    /// Pixel columns of MC-GPU run along (v, −u, 0) and are those of the device. Its rows run towards z, against device
-    /// y: with columns to the right and the beam going away from the viewer, device y points down.
+    /// Pixel columns of MC-GPU run along (v, −u, 0) and are those of the device. Its rows run towards z, opposite to device
+    /// y: with columns to the right and the beam pointing away from the viewer, device y points down.
     pub fn ct_from_device(&self) -> Isometry3<f64> {
         let beam = self.direction.into_inner();
         let across = Vector3::new(beam.y, -beam.x, 0.0);
-        // For a beam along z any column would do; MC-GPU takes x.
+        // For a beam along z any column direction would do; MC-GPU uses x.
         let columns = across.try_normalize(1e-4).unwrap_or_else(Vector3::x);
         let columns = (columns - beam * beam.dot(&columns)).normalize();
         let axes = Matrix3::from_columns(&[columns, beam.cross(&columns), beam]);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::lines::{Lines, columns, holds, numbers};
 
-/// The headline of a section, shortened.
+/// Returns the headline of a section, shortened.
 fn headline(line: &[u8]) -> Option<String> {
     let shown = || {
         String::from_utf8_lossy(&line[..line.len().min(80)])
@@ -15,19 +15,19 @@ fn headline(line: &[u8]) -> Option<String> {
     holds(line, "SECTION ").then(shown)
 }
 
-/// A file that the input file names.
+/// A file named in the input file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedFile {
-    /// Line of the input file, counted from 1.
+    /// Line of the input file, from 1.
     pub line: u64,
     /// The file, resolved against the folder of the input file.
     pub path: PathBuf,
 }
 
-/// The lines of an input file that hold values.
+/// The lines of an input file that contain values.
 pub(super) struct Values {
     pub lines: Lines,
-    /// The headline that ended the section, until the next section is looked for.
+    /// The headline that ended the section, until the next section is searched for.
     headline: Option<String>,
 }
 
@@ -39,7 +39,7 @@ impl Values {
         })
     }
 
-    /// Goes on to the headline of a section.
+    /// Skips to the headline of a section.
     pub fn section(
         &mut self,
         section: &'static str,
@@ -75,7 +75,7 @@ impl Values {
         }
     }
 
-    /// The next line that says something, without comment and outer blanks; `None` at a headline or the end.
+    /// Returns the next line with content, without comment and outer blanks; `None` at a headline or the end.
     pub fn next(&mut self) -> Result<Option<String>, McgpuError> {
         while let Some(line) = self.lines.next()? {
             self.headline = headline(line);
@@ -99,7 +99,7 @@ impl Values {
         }
     }
 
-    /// The first numbers of the next line, which `fits` must accept.
+    /// Parses the first numbers of the next line, which `fits` must accept.
     pub fn number<const N: usize>(
         &mut self,
         expected: &str,
@@ -112,7 +112,7 @@ impl Values {
         }
     }
 
-    /// The first word of the next line.
+    /// Returns the first word of the next line.
     fn word(&mut self, expected: &str) -> Result<String, McgpuError> {
         let value = self.value(expected)?;
         Ok(columns(value.as_bytes()).next().unwrap_or_default().into())
@@ -124,7 +124,7 @@ impl Values {
         Ok(NamedFile { line, path })
     }
 
-    /// The name of a file to write, without its folder: results go where the caller wants them.
+    /// Returns the name of a file to write, without its folder, which the caller chooses.
     pub fn output_name(&mut self, expected: &str) -> Result<String, McgpuError> {
         let word = self.word(expected)?;
         match Path::new(&word).file_name() {

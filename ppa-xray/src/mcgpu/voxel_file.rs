@@ -20,20 +20,20 @@ pub struct VoxelFile {
     pub size: [usize; 3],
     /// Sides of a voxel, cm.
     pub side_cm: [f64; 3],
-    /// Material number, counted from 1; x runs fastest, then y, then z.
+    /// Material number, from 1; x runs fastest, then y, then z.
     pub material: Vec<u8>,
     /// Density, g/cm³, in the same order.
     pub density_g_cm3: Vec<f32>,
 }
 
 impl VoxelFile {
-    /// Reads a voxel file, one line per voxel. Empty lines and lines that begin with `#` are read over.
+    /// Reads a voxel file, one line per voxel. Empty lines and lines that begin with `#` are skipped.
     ///
-    /// The header names the columns of material and density; MC-GPU takes the first two, whatever it says.
+    /// The header gives the columns of material and density; MC-GPU always uses the first two.
     ///
     /// # Errors
-    /// [`McgpuError`] for a header or a voxel that makes no sense, for more or fewer voxels than the header names, and
-    /// for a volume that the memory cannot hold. No memory is asked for before the length of the file allows it.
+    /// [`McgpuError`] for an invalid header or voxel, for more or fewer voxels than the header specifies, and
+    /// for a volume that does not fit into memory. No memory is allocated before the length of the file is checked.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, McgpuError> {
         Self::read_into(path.as_ref(), available_bytes())
     }
@@ -73,7 +73,7 @@ impl VoxelFile {
         })
     }
 
-    /// Materials that occur, counted from 0, in ascending order.
+    /// Materials in use, from 0, in ascending order.
     pub fn materials(&self) -> Vec<u8> {
         let mut occurs = [false; 256];
         for &number in &self.material {
@@ -85,11 +85,11 @@ impl VoxelFile {
             .collect()
     }
 
-    /// The geometry with the materials of [`VoxelFile::materials`], in that order. Axes and origin are kept; lengths
-    /// become mm.
+    /// Converts the geometry to a phantom with the materials of [`VoxelFile::materials`], in that order. Axes and origin are kept;
+    /// lengths are converted to mm.
     ///
     /// # Errors
-    /// [`PhantomError`] when materials are missing.
+    /// [`PhantomError`] if materials are missing.
     pub fn into_phantom(self, materials: Vec<Material>) -> Result<VoxelPhantom, PhantomError> {
         let mut place = [0; 256];
         for (index, &number) in self.materials().iter().enumerate() {
@@ -115,7 +115,7 @@ fn says_nothing(line: &[u8]) -> bool {
     }
 }
 
-/// Memory that can be had without swapping, as the system says; without an answer, 16 GB.
+/// Memory available without swapping, as reported by the system; 16 GB if unknown.
 fn available_bytes() -> u64 {
     let said = std::fs::read_to_string("/proc/meminfo")
         .ok()
@@ -262,7 +262,7 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Whatever a damaged file holds, reading ends in voxels or an error.
+        /// Reading a damaged file returns voxels or an error, whatever its content.
         #[test]
         fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
             let _ = read(&mangled::damaged(SAMPLE.as_bytes(), &damage));

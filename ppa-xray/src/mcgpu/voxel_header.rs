@@ -3,16 +3,16 @@
 use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::lines::{Lines, columns, holds, numbers};
 
-/// Fewest bytes that a voxel takes in the file: two digits, the blank between them, and a line feed.
+/// Smallest number of bytes per voxel in the file: two digits, the blank between them, and a line feed.
 const BYTES_PER_LINE: u64 = 4;
 
-/// Bytes that a voxel takes in memory: material, density, and what the transport makes of them.
+/// Bytes per voxel in memory: material, density, and the tables of the transport.
 const BYTES_PER_VOXEL: u64 = 10;
 
-/// Last column that material and density may stand in.
+/// Last column allowed for material and density.
 const LAST_COLUMN: usize = 16;
 
-/// What stands above the voxels.
+/// The header above the voxels.
 pub(super) struct VoxelHeader {
     pub size: [u64; 3],
     pub side_cm: [f64; 3],
@@ -66,11 +66,11 @@ impl VoxelHeader {
         })
     }
 
-    /// Number of voxels, if file and memory can hold them.
+    /// Number of voxels, if the file and the memory can hold them.
     pub fn voxels(&self, lines: &Lines, available: u64) -> Result<usize, McgpuError> {
-        // At most 10²⁷: no overflow in 128 bits.
+        // At most 10²⁷, so 128 bits do not overflow.
         let voxels: u128 = self.size.iter().map(|&n| u128::from(n)).product();
-        // The last line may lack its line feed.
+        // The last line may have no line feed.
         let most = lines.most_text_bytes().saturating_add(1) / BYTES_PER_LINE;
         if voxels > u128::from(most) {
             return Err(McgpuError::VoxelsMissing {
@@ -92,7 +92,7 @@ impl VoxelHeader {
         Ok(voxels as usize)
     }
 
-    /// Material number and density in a line.
+    /// Parses the material number and the density in a line.
     #[inline]
     pub fn voxel(&self, line: &[u8]) -> Option<(u8, f32)> {
         let (number, density) = if self.columns == [0, 1] {
@@ -115,7 +115,7 @@ impl VoxelHeader {
     }
 }
 
-/// The next line, which must be there.
+/// Returns the next line, or an error at the end of the file.
 fn expect(lines: &mut Lines, expected: &str) -> Result<Vec<u8>, McgpuError> {
     let line = lines.next()?.map(<[u8]>::to_vec);
     line.ok_or_else(|| lines.ends(expected))

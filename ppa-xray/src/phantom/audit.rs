@@ -1,4 +1,4 @@
-//! Audit of a HU calibration on a scan: mass of each material, and values outside the range of scan or calibration.
+//! Audit of a HU calibration on a scan: mass of each material, and values outside the range of the scan or the calibration.
 
 use ppa_ct::Volume;
 use serde::Serialize;
@@ -10,10 +10,10 @@ use crate::phantom::segment::Segment;
 use crate::phantom::segmentation::Segmentation;
 use crate::phantom::voxels::{PhantomError, check_mask, voxel_mm3};
 
-/// Elements from scandium on count as metal.
+/// Elements from scandium onwards count as metal.
 const LIGHTEST_METAL: u8 = 21;
 
-/// What a calibration makes of a scan. Voxels outside the mask are counted once and left out of everything else.
+/// Result of applying a calibration to a scan. Voxels outside the mask are counted once and excluded from everything else.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Audit {
     /// Voxels of the scan.
@@ -40,54 +40,54 @@ pub struct Audit {
     pub clipped_above: usize,
     /// Mass of all voxels, g.
     pub mass_g: f64,
-    /// Volume of the segments that are metal: more than half of their mass in elements from scandium (Z = 21) on, cm³.
+    /// Volume of the metal segments, in which more than half of the mass is in elements from scandium (Z = 21) onwards, cm³.
     pub metal_cm3: f64,
     /// The segments of the calibration, from low to high HU.
     pub segments: Vec<SegmentAudit>,
 }
 
-/// What a scan holds of one segment of the calibration.
+/// Voxels of a scan that belong to one segment of the calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SegmentAudit {
     /// Name of the segment.
     pub name: String,
-    /// Voxels.
+    /// Number of voxels.
     pub voxels: usize,
-    /// Their volume, cm³.
+    /// Volume of the voxels, cm³.
     pub volume_cm3: f64,
-    /// Their mass, g.
+    /// Mass of the voxels, g.
     pub mass_g: f64,
-    /// Lowest HU among them.
+    /// Lowest HU of the voxels.
     pub lowest_hu: Option<f32>,
-    /// Highest HU among them.
+    /// Highest HU of the voxels.
     pub highest_hu: Option<f32>,
-    /// Voxels below the first knot of a density curve of two or more: they get the density of that knot.
+    /// Voxels below the first knot of a density curve of two or more knots; they get the density of that knot.
     pub below_curve: usize,
-    /// Voxels above the last knot of a density curve of two or more: they get the density of that knot.
+    /// Voxels above the last knot of a density curve of two or more knots; they get the density of that knot.
     pub above_curve: usize,
-    /// How often which HU occur: bins with voxels, from low to high.
+    /// Histogram of the HU: bins with voxels, from low to high.
     pub bins: Vec<HuBin>,
     /// Materials that occur, in order of their attenuation for a mixture.
     pub materials: Vec<MaterialCount>,
 }
 
-/// How often a material occurs.
+/// Voxels of one material.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MaterialCount {
     /// Name of the material.
     pub name: String,
-    /// Voxels.
+    /// Number of voxels.
     pub voxels: usize,
-    /// Their HU: bins with voxels, from low to high.
+    /// Histogram of the HU: bins with voxels, from low to high.
     pub bins: Vec<HuBin>,
 }
 
 impl HuCalibration {
-    /// Counts what this calibration makes of a scan; `mask` (one flag per voxel) as in
+    /// Applies this calibration to a scan and counts the results. `mask` has one flag per voxel, as in
     /// [`VoxelPhantom::from_volume`](crate::VoxelPhantom::from_volume).
     ///
     /// # Errors
-    /// [`PhantomError`] when the calibration is not usable, the mask has the wrong length or holds no voxel at all.
+    /// [`PhantomError`] if the calibration is invalid, or if the mask has the wrong length or is empty.
     pub fn audit(&self, volume: &Volume, mask: Option<&[bool]>) -> Result<Audit, PhantomError> {
         let segmentation = Segmentation::new(self)?;
         let hu = volume.values();
@@ -162,7 +162,7 @@ fn is_metal(material: &Material) -> bool {
     metal > 0.5
 }
 
-/// What is added up of one segment.
+/// Sums over one segment.
 struct SegmentSums<'a> {
     segment: &'a Segment,
     histogram: Histogram,
@@ -217,7 +217,7 @@ mod tests {
 
     use super::*;
 
-    /// Ten voxels whose answer is known by hand.
+    /// Ten voxels with a result known by hand.
     #[test]
     fn voxels_are_counted_by_segment_with_volume_mass_and_limits() {
         let grid =
@@ -271,7 +271,7 @@ mod tests {
         ));
     }
 
-    /// Forty voxels of an implant beyond the scanner's scale, in a block of muscle and bone: found, and only there.
+    /// Forty voxels of an implant beyond the scanner's scale, in a block of muscle and bone, are found, and nothing else is.
     #[test]
     fn a_clipped_implant_is_found() {
         let grid =
@@ -281,7 +281,7 @@ mod tests {
             let volume = Volume::new(grid.clone(), hu.to_vec()).unwrap();
             HuCalibration::default().audit(&volume, None).unwrap()
         };
-        // A block that holds every HU equally often ends like a tail.
+        // A block that contains every HU equally often ends like a tail.
         let without = audit_of(&hu);
         assert_eq!((without.clipped_below, without.clipped_above), (0, 0));
         hu[4_000..4_040].fill(3_071.0);
@@ -296,7 +296,7 @@ mod tests {
         );
     }
 
-    /// A curve that ends too early is reported: its last density would stand for everything above.
+    /// A curve that ends too early is reported: its last density would apply to everything above.
     #[test]
     fn voxels_beyond_the_curve_are_counted() {
         let grid = Grid::axis_aligned([4, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();

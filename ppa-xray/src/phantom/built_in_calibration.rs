@@ -1,4 +1,4 @@
-//! The calibration that is used unless another one is given; `data/hu_calibration.toml` holds the same as an example, with its sources.
+//! The default calibration; `data/hu_calibration.toml` contains the same as an example, with its sources.
 
 use crate::phantom::segment::{Composition, Constituent, Segment};
 

@@ -19,66 +19,66 @@ pub enum CalibrationError {
     /// The file cannot be read.
     #[error("cannot be read")]
     Read(#[source] std::io::Error),
-    /// The text is not a calibration.
+    /// The text is not a valid calibration.
     #[error("line {line}: {message}")]
     Syntax {
-        /// The line, counted from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong there.
+        /// What is wrong with the line.
         message: String,
     },
-    /// There is nothing in it.
+    /// The calibration has no segments.
     #[error("the calibration has no [[segment]]")]
     Empty,
-    /// A segment does not begin above the one before.
+    /// A segment does not begin above the previous one.
     #[error("segment {segment:?} {}, expected a number above {previous} HU", match found {
         Some(found) => format!("begins at {found} HU"),
         None => "has no `from_hu`".to_owned(),
     })]
     Start {
-        /// The segment.
+        /// Name of the segment.
         segment: String,
-        /// Where it begins.
+        /// HU at which the segment begins.
         found: Option<f32>,
-        /// Where the one before begins.
+        /// HU at which the previous segment begins.
         previous: f32,
     },
-    /// A segment without density.
+    /// A segment has no density.
     #[error("segment {segment:?} has no density knots [HU, g/cm³], expected at least one")]
     Knots {
-        /// The segment.
+        /// Name of the segment.
         segment: String,
     },
-    /// The density curve must rise in HU and never fall in density.
+    /// The density curve does not rise in HU, or falls in density.
     #[error(
         "segment {segment:?}: knot {knot} of the density, {} HU and {} g/cm³, is not positive or does not continue the curve upwards",
         found[0], found[1]
     )]
     Curve {
-        /// The segment.
+        /// Name of the segment.
         segment: String,
-        /// The knot, counted from 1.
+        /// Number of the knot, from 1.
         knot: usize,
         /// HU and density found.
         found: [f32; 2],
     },
-    /// The ends of a mixture have no rising densities.
+    /// The densities of the ends of a mixture do not rise.
     #[error(
         "segment {segment:?} mixes materials of {} and {} g/cm³, expected positive, rising densities",
         found[0], found[1]
     )]
     Mixture {
-        /// The segment.
+        /// Name of the segment.
         segment: String,
         /// Densities given, g/cm³.
         found: [f32; 2],
     },
-    /// A material of a segment does not exist.
+    /// A material of a segment is invalid.
     #[error("segment {segment:?}")]
     Material {
-        /// The segment.
+        /// Name of the segment.
         segment: String,
-        /// What is wrong with its material.
+        /// What is wrong with the material.
         source: Box<MaterialError>,
     },
 }

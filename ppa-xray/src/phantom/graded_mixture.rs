@@ -1,7 +1,7 @@
-//! Gradual mixtures of two materials, such as bone between spongy and compact, mixed by density.
+//! Gradual mixtures of two materials by density, such as bone between spongy and compact.
 //!
-//! A voxel of spongy bone holds marrow and thin trabeculae. Taking it for cortical bone of low density would
-//! make it far too opaque at diagnostic energies, where the calcium absorbs most, and would draw a hard edge where
+//! A voxel of spongy bone contains marrow and thin trabeculae. Treating it as cortical bone of low density would
+//! make it far too opaque at diagnostic energies, where the calcium absorbs most, and would create a hard edge where
 //! the HU threshold cuts through a gradual transition.
 
 use crate::matter::material::Material;
@@ -10,24 +10,24 @@ use crate::matter::material_error::MaterialError;
 /// Mass attenuation of neighbouring levels differs by about this factor at [`OPACITY_KEV`], and by less at higher energies.
 const LEVEL_RATIO: f64 = 1.05;
 
-/// Energy at which levels are spaced: that of the softest photons that matter in a radiograph.
+/// Energy at which levels are spaced: the softest photons that contribute to a radiograph.
 const OPACITY_KEV: f64 = 30.0;
 
-/// More levels would cost memory and gain nothing: 64 span a factor of 20.
+/// Largest number of levels. More would cost memory without benefit: 64 span a factor of 20.
 const MOST_LEVELS: f64 = 64.0;
 
-/// Two materials side by side in a voxel, in levels from nearly the first to nearly the second.
+/// Two materials in the same voxel, in levels from nearly the first to nearly the second.
 ///
-/// Densities mix by volume: ρ = (1 − v) ρ₀ + v ρ₁, where ρ₀ and ρ₁ are the densities of voxels that hold nothing else;
-/// w = v ρ₁ / ρ of the mass is the second.
+/// Densities mix by volume: ρ = (1 − v) ρ₀ + v ρ₁, where ρ₀ and ρ₁ are the densities of voxels of one material;
+/// the mass fraction of the second is w = v ρ₁ / ρ.
 pub(crate) struct GradedMixture {
     pub levels: Vec<Material>,
-    /// Density at which each level ends and the next begins; one less than levels.
+    /// Density at which each level ends and the next begins; one less than there are levels.
     bounds_g_cm3: Vec<f32>,
 }
 
 impl GradedMixture {
-    /// Levels named `name`, between two materials that fill voxels of these densities.
+    /// Builds levels named `name` between two materials, with the densities of voxels that they fill.
     pub fn new(
         name: &str,
         materials: [&Material; 2],
@@ -38,7 +38,7 @@ impl GradedMixture {
         let count = (opacity.ln().abs() / LEVEL_RATIO.ln())
             .round()
             .clamp(1.0, MOST_LEVELS);
-        // Spaced so that each level is by the same factor more opaque than the one before.
+        // Spaced so that the opacity increases by the same factor from level to level.
         let mass_share = |step: f64| {
             let share = step / count;
             if (opacity - 1.0).abs() < 1e-3 {
@@ -67,7 +67,7 @@ impl GradedMixture {
         })
     }
 
-    /// Which level a voxel of this density is; what is denser than the second material is the last.
+    /// Level of a voxel of this density; voxels denser than the second material are in the last level.
     pub fn level(&self, density_g_cm3: f32) -> usize {
         self.bounds_g_cm3
             .partition_point(|&bound| bound <= density_g_cm3)
@@ -99,7 +99,7 @@ mod tests {
         }
     }
 
-    /// Half of each by volume is the level whose mass share says so: w = v ρ₁ / ρ.
+    /// A half-and-half mixture by volume is in the level with the corresponding mass share: w = v ρ₁ / ρ.
     #[test]
     fn a_density_gets_the_level_of_its_mass_share() {
         let bone = bone();

@@ -7,22 +7,22 @@ use serde::Serialize;
 /// Width of a bin, HU.
 pub(crate) const BIN_HU: u16 = 50;
 
-/// Fewer voxels at an end than this are no pile.
+/// Smallest number of voxels at an end that counts as a pile.
 const SMALLEST_PILE: usize = 10;
 
 /// Voxels at an end are a pile if the same range of HU next to it holds fewer than this share of them.
 const PILE_OVER_NEIGHBOURS: f64 = 2.0;
 
-/// Voxels whose value lies in `from_hu` up to but not including `from_hu` + [`Audit::bin_hu`](crate::Audit::bin_hu).
+/// Number of voxels with values from `from_hu` up to but not including `from_hu` + [`Audit::bin_hu`](crate::Audit::bin_hu).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HuBin {
     /// Lower edge, a multiple of the width.
     pub from_hu: f32,
-    /// Voxels.
+    /// Number of voxels.
     pub voxels: usize,
 }
 
-/// How many voxels hold one value, the lowest or the highest.
+/// The lowest or highest value, and its number of voxels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extreme {
     pub hu: f32,
@@ -32,14 +32,14 @@ pub(crate) struct Extreme {
 /// A set of Hounsfield values.
 #[derive(Debug, Clone)]
 pub(crate) struct Histogram {
-    /// Voxels by number of the bin; empty bins are left out, since a stray value may lie anywhere.
+    /// Voxels by bin number; empty bins are omitted, since a stray value may be anywhere.
     bins: BTreeMap<i64, usize>,
     lowest: Extreme,
     highest: Extreme,
 }
 
 impl Extreme {
-    /// `beyond`: whether a value lies further out than this one.
+    /// Merges two extremes; `beyond` says whether the other value is further out.
     fn add(&mut self, other: Self, beyond: bool) {
         if beyond {
             *self = other;
@@ -89,7 +89,7 @@ impl Histogram {
         self.bins.iter().map(made).collect()
     }
 
-    /// `None` without voxels.
+    /// Lowest and highest value; `None` without voxels.
     pub fn extremes(&self) -> Option<[Extreme; 2]> {
         (!self.bins.is_empty()).then_some([self.lowest, self.highest])
     }
@@ -108,7 +108,7 @@ impl Histogram {
         self.pile(self.highest, bin - 1..=bin, end_hu)
     }
 
-    /// A tail that nothing cuts thins out: its last HU holds no more voxels than those before it on average, which are
+    /// A tail that is not cut off thins out: its last HU has at most the average number of voxels of the HU before it, which are
     /// those in the bins `near`, up to `end_hu`.
     fn pile(&self, at: Extreme, near: std::ops::RangeInclusive<i64>, end_hu: f64) -> usize {
         let near: usize = self.bins.range(near).map(|(_, voxels)| voxels).sum();
@@ -119,7 +119,7 @@ impl Histogram {
     }
 }
 
-/// Values beyond any scanner's share the outermost bins.
+/// Bin of a value; values beyond any scanner's range go to the outermost bins.
 fn bin(hu: f32) -> i64 {
     (hu / f32::from(BIN_HU)).floor().clamp(-1e9, 1e9) as i64
 }
@@ -138,7 +138,7 @@ mod tests {
     }
 
     proptest! {
-        /// Bins hold every value once, wherever it lies, and parts merge to the whole.
+        /// Bins hold every value exactly once, and parts merge to the full histogram.
         #[test]
         fn bins_hold_all_values(values in proptest::collection::vec(prop_oneof![-3000.0..4000.0_f32, -1e9..1e9_f32], 1..200), cut in 0.0..1.0_f64) {
             let whole = of(values.iter().copied());
@@ -157,7 +157,7 @@ mod tests {
         }
     }
 
-    /// Noise of a scanner about air and about metal, cut at the ends of the scale, and not cut.
+    /// Scanner noise around air and around metal, with and without clipping at the ends of the scale.
     #[test]
     fn clipping_is_found_and_tails_are_not_taken_for_it() {
         let values = |mean: f32| {

@@ -1,4 +1,4 @@
-//! From Hounsfield units to material and mass density: a table per scanner.
+//! Conversion of Hounsfield units to material and mass density, by a table per scanner.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,10 +6,10 @@ use crate::phantom::built_in_calibration;
 use crate::phantom::calibration_error::CalibrationError;
 use crate::phantom::segment::Segment;
 
-/// A table that turns HU into material and density, after Schneider, Bortfeld and Schlegel, Phys. Med. Biol. 45 (2000) 459.
+/// A table that converts HU to material and density, after Schneider, Bortfeld and Schlegel, Phys. Med. Biol. 45 (2000) 459.
 ///
-/// The Hounsfield scale is cut into segments. Each has one material, or a mixture of two that changes gradually, and a
-/// density curve, so that the density is continuous within a segment. Which HU stands for which density depends on
+/// The Hounsfield scale is divided into segments. Each has one material, or a gradual mixture of two, and a
+/// density curve, so the density is continuous within a segment. The relation between HU and density depends on
 /// scanner, tube voltage and kernel: a table can be read from a TOML file (`HuCalibration::read`, feature `files`); the default is
 /// `data/hu_calibration.toml` of this crate.
 ///
@@ -61,7 +61,7 @@ impl HuCalibration {
     /// Reads a table from a TOML file.
     ///
     /// # Errors
-    /// [`CalibrationError`] naming the file, and the line or the segment at fault.
+    /// [`CalibrationError`] naming the file, and the line or the segment that is invalid.
     #[cfg(feature = "files")]
     pub fn read(path: &std::path::Path) -> Result<Self, CalibrationError> {
         let in_file = |source| CalibrationError::File {
@@ -74,10 +74,10 @@ impl HuCalibration {
             .map_err(in_file)
     }
 
-    /// A table from the text of a TOML file.
+    /// Reads a table from the text of a TOML file.
     ///
     /// # Errors
-    /// [`CalibrationError`] naming the line or the segment at fault.
+    /// [`CalibrationError`] naming the line or the segment that is invalid.
     #[cfg(feature = "files")]
     pub fn parse(text: &str) -> Result<Self, CalibrationError> {
         let table: Self = toml::from_str(text).map_err(|error| CalibrationError::Syntax {
@@ -93,7 +93,7 @@ impl HuCalibration {
     /// Checks that segments and knots rise, that no density falls and that every material exists.
     ///
     /// # Errors
-    /// [`CalibrationError`] naming the segment at fault.
+    /// [`CalibrationError`] naming the invalid segment.
     pub fn validate(&self) -> Result<(), CalibrationError> {
         if self.segments.is_empty() {
             return Err(CalibrationError::Empty);
@@ -116,7 +116,7 @@ impl HuCalibration {
         Ok(())
     }
 
-    /// The segment a Hounsfield value belongs to; values below the first belong to it as well.
+    /// The segment of a Hounsfield value; values below the first segment belong to it as well.
     pub fn segment(&self, hu: f32) -> &Segment {
         &self.segments[self.segment_index(hu)]
     }
@@ -187,7 +187,7 @@ mod tests {
         assert_eq!(HuCalibration::parse(&text).unwrap(), calibration);
     }
 
-    /// Every kind of mistake is reported with the segment or the line it is in.
+    /// Every kind of mistake is reported with its segment or line.
     #[test]
     fn mistakes_are_reported_with_their_place() {
         let broken = |from: &str, to: &str| {

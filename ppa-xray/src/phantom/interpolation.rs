@@ -1,4 +1,4 @@
-//! How density varies between the centres of voxels.
+//! Interpolation of the density between the centres of voxels.
 
 /// How density varies between the centres of voxels.
 ///
@@ -19,7 +19,7 @@ pub enum Interpolation {
 }
 
 impl Interpolation {
-    /// Voxels around a place, beyond the one that holds it, that have a share in its density.
+    /// Number of voxels around the voxel at a point that contribute to the density there.
     pub(crate) fn halo(self) -> usize {
         match self {
             Self::Nearest => 0,

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix4, Point3, Vector3};
 use ppa_ct::Grid;
 
-/// The voxel box of a phantom seen from the device.
+/// The voxel box of a phantom as seen from the device.
 ///
 /// Cell space counts voxels from the corner of the box: voxel i spans [i, i + 1). The map from the
 /// device frame is affine and may shear; a ray keeps its parameter, which is mm in the device frame.
@@ -22,7 +22,7 @@ pub(crate) struct Ray {
 }
 
 impl Ray {
-    /// The same ray in cubes of `edge` cells.
+    /// The same ray in units of cubes of `edge` cells.
     #[inline]
     pub fn shrunk(&self, edge: usize) -> Self {
         let shrink = 1.0 / edge as f64;
@@ -44,14 +44,14 @@ impl Lattice {
         }
     }
 
-    /// Cells from mm in the device frame.
+    /// Transform from mm in the device frame to cells.
     pub fn cell_from_device(&self) -> Matrix4<f64> {
         let mut matrix = self.linear.to_homogeneous();
         matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&self.offset);
         matrix
     }
 
-    /// mm in the device frame from cells.
+    /// Transform from cells to mm in the device frame.
     pub fn device_from_cell(&self) -> Matrix4<f64> {
         self.cell_from_device()
             .try_inverse()
@@ -66,7 +66,7 @@ impl Lattice {
         }
     }
 
-    /// Where the ray is inside the box: entry and exit in mm, entry not before 0.
+    /// Part of the ray inside the box: entry and exit in mm, with entry not below 0.
     #[inline]
     pub fn clip(&self, ray: &Ray) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
@@ -87,7 +87,7 @@ impl Lattice {
     }
 }
 
-/// Walk from cell to cell (Amanatides and Woo, Eurographics 1987), with cubes of `edge` voxels as cells.
+/// Traversal from cell to cell (Amanatides and Woo, Eurographics 1987), with cubes of `edge` voxels as cells.
 #[derive(Debug, Clone)]
 pub(crate) struct Walk {
     /// Current cell; an axis that has left the lattice holds a number ≥ its count.
@@ -102,7 +102,7 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
-    /// Starts in the cell that holds the ray at `start_mm`, which must lie in the box.
+    /// Starts in the cell that contains the ray at `start_mm`, which must be in the box.
     #[inline]
     pub fn new(ray: &Ray, start_mm: f64, count: [u32; 3], edge: f64) -> Self {
         let mut walk = Self {
@@ -139,7 +139,7 @@ impl Walk {
         walk
     }
 
-    /// The axis along which the current cell is left, and where, mm.
+    /// The axis along which the ray leaves the current cell, and the ray parameter at that point, mm.
     #[inline]
     pub fn exit(&self) -> (usize, f64) {
         let [x, y, z] = self.next_mm;
@@ -152,7 +152,7 @@ impl Walk {
         }
     }
 
-    /// Enters the neighbour along `axis`; false once outside the lattice.
+    /// Enters the neighbour along `axis`; returns false once outside the lattice.
     #[inline]
     pub fn advance(&mut self, axis: usize) -> bool {
         self.cell[axis] = self.cell[axis].wrapping_add(self.step[axis]);
@@ -181,7 +181,7 @@ mod tests {
     }
 
     proptest! {
-        /// The pieces add up to the chord, and each piece's midpoint lies in the cell it is credited to.
+        /// The pieces add up to the chord, and the midpoint of each piece is in the cell that it is assigned to.
         #[test]
         fn pieces_of_a_ray_lie_in_their_cells(
             from in prop::array::uniform3(-60.0..60.0_f64),

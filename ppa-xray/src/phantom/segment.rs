@@ -6,21 +6,21 @@ use crate::matter::material::Material;
 use crate::matter::material_error::MaterialError;
 use crate::phantom::calibration_error::CalibrationError;
 
-/// A part of the Hounsfield scale with one material or one gradual mixture.
+/// A range of the Hounsfield scale with one material or one gradual mixture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "SegmentTable", into = "SegmentTable")]
 pub struct Segment {
-    /// What a reader calls it; errors and the audit name it.
+    /// Name for users; errors and the audit report it.
     pub name: String,
-    /// Lowest HU that belongs to it. `None` only in the first segment, which has no lower end.
+    /// Lowest HU of the segment. `None` only in the first segment, which has no lower end.
     pub from_hu: Option<f32>,
-    /// What it is made of.
+    /// Material or mixture of the segment.
     pub composition: Composition,
     /// Knots [HU, g/cm³] of the density: linear in between, constant outside.
     pub density: Vec<[f32; 2]>,
 }
 
-/// What a segment is made of.
+/// Material or mixture of a segment.
 ///
 /// A material is given by a name of the library ([`Material::named`]) or by mass fractions
 /// ([`Material::parse_composition`]), which are distinguished by the colon.
@@ -28,7 +28,7 @@ pub struct Segment {
 pub enum Composition {
     /// One material.
     Pure(String),
-    /// From one material to another as the density goes from that of the first to that of the second.
+    /// A gradual transition from the first material to the second, by density.
     Mixture([Constituent; 2]),
 }
 
@@ -90,7 +90,7 @@ impl Segment {
         d0 + (d1 - d0) * (hu - h0) / (h1 - h0)
     }
 
-    /// Its one or two materials, at the density they have in it.
+    /// The one or two materials of the segment, at their densities in it.
     pub(crate) fn constituents(&self) -> Result<Vec<Material>, CalibrationError> {
         let made = |text: &str, density_g_cm3: f32| -> Result<Material, MaterialError> {
             if text.contains(':') {
@@ -116,7 +116,7 @@ impl Segment {
     }
 }
 
-/// A segment as it stands in a file.
+/// A segment as written in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SegmentTable {

@@ -1,4 +1,4 @@
-//! A calibration at work: material index and density of a voxel from its Hounsfield value.
+//! Application of a calibration: material index and density of a voxel from its Hounsfield value.
 
 use crate::matter::material::Material;
 use crate::phantom::calibration_error::CalibrationError;
@@ -6,20 +6,20 @@ use crate::phantom::graded_mixture::GradedMixture;
 use crate::phantom::hu::HuCalibration;
 use crate::phantom::segment::{Composition, Segment};
 
-/// The materials of a calibration, and which of them a Hounsfield value stands for.
+/// The materials of a calibration, and their assignment to Hounsfield values.
 pub(crate) struct Segmentation<'a> {
     calibration: &'a HuCalibration,
     kinds: Vec<Kind>,
     materials: Vec<Material>,
 }
 
-/// Where a segment's materials stand in the list.
+/// Position of a segment's materials in the list.
 struct Kind {
     first: usize,
     mixture: Option<GradedMixture>,
 }
 
-/// What a Hounsfield value stands for.
+/// Material and density for a Hounsfield value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Voxel {
     pub segment: usize,
@@ -50,7 +50,7 @@ impl<'a> Segmentation<'a> {
         &self.materials
     }
 
-    /// −∞ stands for what lies outside the patient.
+    /// Converts a Hounsfield value; −∞ means outside the patient.
     pub fn voxel(&self, hu: f32) -> Voxel {
         let segment = self.calibration.segment_index(hu);
         let density_g_cm3 = self.calibration.segments[segment].density_g_cm3(hu);
@@ -66,7 +66,7 @@ impl<'a> Segmentation<'a> {
     }
 }
 
-/// The materials of a segment, and how its density chooses among them if there are several.
+/// Returns the materials of a segment, and the mixture that selects among them by density if there are several.
 fn made(segment: &Segment) -> Result<(Option<GradedMixture>, Vec<Material>), CalibrationError> {
     let constituents = segment.constituents()?;
     let (Composition::Mixture(ends), [first, second]) = (&segment.composition, &constituents[..])
@@ -98,7 +98,7 @@ mod tests {
     }
 
     /// HU are attenuation relative to water at the scanner's mean energy, about 70 keV at 120 kV: the calibration
-    /// must give them back. 2 % for soft tissue; 5 % for bone covers the levels and the spread of scanners.
+    /// must reproduce them. 2 % for soft tissue; 5 % for bone covers the levels and the differences between scanners.
     #[test]
     fn attenuation_at_ct_energies_is_what_the_hu_say() {
         let water_mm = Material::named("water").unwrap().total_cm2_g(70.0).unwrap() / 10.0;
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// No hard edge at the mean energy of a 60 kV beam where one segment of tissue hands over to the next.
+    /// No hard edge at the mean energy of a 60 kV beam at the boundary between segments of tissue.
     #[test]
     fn tissues_meet_without_a_step() {
         for hu in [14.0, 100.0] {

@@ -1,4 +1,4 @@
-//! The patient as the photons see it: one material and one density per voxel.
+//! The patient as seen by the photons: one material and one density per voxel.
 
 use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
@@ -11,29 +11,29 @@ use crate::phantom::hu::HuCalibration;
 use crate::phantom::interpolation::Interpolation;
 use crate::phantom::segmentation::Segmentation;
 
-/// Why a voxel phantom cannot be made.
+/// Why a voxel phantom is not valid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PhantomError {
     /// Number of values and number of voxels differ.
     #[error("{found} {what} for {expected} voxels")]
     Length {
-        /// Which values.
+        /// Name of the values.
         what: &'static str,
-        /// Values given.
+        /// Number of values given.
         found: usize,
-        /// Voxels of the grid.
+        /// Number of voxels of the grid.
         expected: usize,
     },
-    /// No material, or more than an 8-bit index can name.
+    /// There is no material, or there are more than an 8-bit index can address.
     #[error("{0} materials; a phantom holds 1 to 256")]
     MaterialCount(usize),
-    /// A voxel names a material that does not exist.
+    /// A voxel refers to a material that does not exist.
     #[error("voxel ({}, {}, {}) has material index {found}, but the number of materials is {materials}", voxel[0], voxel[1], voxel[2])]
     MaterialIndex {
         /// The voxel (i, j, k).
         voxel: [usize; 3],
-        /// Its material index.
+        /// Material index of the voxel.
         found: u8,
         /// Number of materials.
         materials: usize,
@@ -43,18 +43,18 @@ pub enum PhantomError {
     Density {
         /// The voxel (i, j, k).
         voxel: [usize; 3],
-        /// Its density.
+        /// Density of the voxel.
         found: f32,
     },
-    /// A mask without a voxel.
+    /// The mask contains no voxels.
     #[error("the mask contains none of the scan's voxels")]
     EmptyMask,
-    /// The HU calibration makes no sense.
+    /// The HU calibration is invalid.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
 }
 
-/// A mask says of every voxel whether it counts.
+/// Checks that the mask has one flag per voxel and that at least one is set.
 pub(super) fn check_mask(mask: Option<&[bool]>, voxels: usize) -> Result<(), PhantomError> {
     match mask {
         Some(mask) if mask.len() != voxels => Err(PhantomError::Length {
@@ -74,7 +74,7 @@ pub(crate) fn voxel_mm3(grid: &Grid) -> f64 {
 
 /// Materials and densities on the lattice of a CT; vacuum outside it.
 ///
-/// [`Interpolation`] says what lies between the centres of voxels. Memory order is that of [`Grid::index`], i fastest.
+/// [`Interpolation`] determines the density between the centres of voxels. Memory order is that of [`Grid::index`], i fastest.
 #[derive(Debug, Clone)]
 pub struct VoxelPhantom {
     grid: Grid,
@@ -85,10 +85,10 @@ pub struct VoxelPhantom {
 }
 
 impl VoxelPhantom {
-    /// A phantom of homogeneous voxels, from one material index and one density in g/cm³ each.
+    /// Builds a phantom of homogeneous voxels from one material index and one density in g/cm³ each.
     ///
     /// # Errors
-    /// [`PhantomError`] naming the voxel or the count at fault.
+    /// [`PhantomError`] naming the invalid voxel or count.
     pub fn new(
         grid: Grid,
         material: Vec<u8>,
@@ -139,7 +139,7 @@ impl VoxelPhantom {
         })
     }
 
-    /// The same voxels with another density between their centres.
+    /// The same voxels with another interpolation of the density between their centres.
     #[must_use]
     pub fn with_interpolation(self, interpolation: Interpolation) -> Self {
         Self {
@@ -148,7 +148,7 @@ impl VoxelPhantom {
         }
     }
 
-    /// The same voxels with Rayleigh scattering by other form factors, as [`Material::with_form_factors`].
+    /// The same voxels with Rayleigh scattering by other form factors, see [`Material::with_form_factors`].
     #[must_use]
     pub fn with_form_factors(mut self, form_factors: FormFactors) -> Self {
         let materials = self.materials.into_iter();
@@ -158,11 +158,11 @@ impl VoxelPhantom {
         self
     }
 
-    /// A phantom from Hounsfield units, trilinear between the centres of voxels; voxels outside `mask` (one flag per voxel) become what the lowest HU stand for,
-    /// air. [`HuCalibration::audit`] lists what became of the voxels.
+    /// Builds a phantom from Hounsfield units, trilinear between the centres of voxels. Voxels outside `mask` (one flag per voxel)
+    /// get the material of the lowest HU, air. [`HuCalibration::audit`] lists the resulting materials.
     ///
     /// # Errors
-    /// [`PhantomError`] when the calibration is not usable or the mask has the wrong length.
+    /// [`PhantomError`] if the calibration is invalid or the mask has the wrong length.
     pub fn from_volume(
         volume: &Volume,
         calibration: &HuCalibration,
@@ -179,7 +179,7 @@ impl VoxelPhantom {
                 f32::NEG_INFINITY
             })
         };
-        // Only materials that occur are kept: each costs sampling tables.
+        // Only materials in use are kept, since each costs sampling tables.
         let none = || vec![false; segmentation.materials().len()];
         let occurs = (0..hu.len())
             .into_par_iter()
@@ -218,7 +218,7 @@ impl VoxelPhantom {
         &self.grid
     }
 
-    /// What lies between the centres of voxels.
+    /// Interpolation of the density between the centres of voxels.
     pub fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
@@ -233,7 +233,7 @@ impl VoxelPhantom {
         &self.density_g_cm3
     }
 
-    /// The materials that occur.
+    /// The materials in use.
     pub fn materials(&self) -> &[Material] {
         &self.materials
     }

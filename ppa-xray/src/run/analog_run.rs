@@ -1,4 +1,4 @@
-//! A run of the analog engine, in batches of histories between checks of when to stop.
+//! A run of the analog engine, in batches of histories separated by checks of the stopping rules.
 
 use std::ops::ControlFlow;
 #[cfg(feature = "files")]
@@ -26,13 +26,13 @@ use crate::run::progress::{Progress, Stop, Stopped, is_check, next_check};
 use crate::run::tally_error::TallyError;
 use crate::transport::tracking::{Transport, TransportError};
 
-/// About the longest time between two checks.
+/// Approximate upper limit of the time between two checks.
 const CHECK_EVERY: Duration = Duration::from_millis(250);
 
 /// Histories of the first batch, before the rate is known.
 const FIRST_BATCH: u64 = 16_384;
 
-/// Fewest histories worth handing to the threads.
+/// Smallest batch worth distributing over the threads.
 const LEAST_BATCH: u64 = 1_024;
 
 /// Why a tally cannot be continued.
@@ -51,10 +51,10 @@ pub enum RunError {
     },
 }
 
-/// An exposure that is simulated photon by photon, as far and in as many parts as its user wants.
+/// An exposure that is simulated photon by photon, in any number of parts.
 ///
-/// What comes out depends on the settings and on which histories are counted, on nothing else: not on the number of
-/// threads, not on interruptions, not on how the run was split.
+/// The result depends only on the settings and on the histories counted: not on the number of
+/// threads, on interruptions, or on how the run was split.
 ///
 /// ```
 /// # use nalgebra::{Isometry3, Point3, Vector3};
@@ -85,7 +85,7 @@ pub struct AnalogRun<'a> {
     key: OnceLock<String>,
 }
 
-/// What counting doses takes.
+/// Data needed to count doses.
 struct DoseCounting {
     settings: DoseSettings,
     setup: DoseSetup,
@@ -93,10 +93,10 @@ struct DoseCounting {
 }
 
 impl<'a> AnalogRun<'a> {
-    /// Prepares a run of [`AnalogSettings::histories`] at most.
+    /// Prepares a run of at most [`AnalogSettings::histories`].
     ///
     /// # Errors
-    /// [`TransportError`] when the geometry, the spectrum or the number of histories makes no sense.
+    /// [`TransportError`] if the geometry, the spectrum or the number of histories is invalid.
     pub fn new(
         phantom: &'a VoxelPhantom,
         spectrum: &'a Spectrum,
@@ -112,10 +112,10 @@ impl<'a> AnalogRun<'a> {
         })
     }
 
-    /// Counts doses as well, which takes a little longer.
+    /// Counts doses as well, which is slightly slower.
     ///
     /// # Errors
-    /// [`DoseError`] for a region outside the phantom.
+    /// [`DoseError`] for a region that extends beyond the phantom.
     pub fn with_dose(self, settings: &DoseSettings) -> Result<Self, DoseError> {
         let setup = DoseSetup::new(&self.exposure.transport, settings)?;
         Ok(Self {
@@ -141,16 +141,16 @@ impl<'a> AnalogRun<'a> {
         AnalogTally::empty(setup, part.share(self.settings.histories))
     }
 
-    /// The tally of an earlier, interrupted run, to continue with. A tally of a whole run may continue to another number of histories.
+    /// Reads the tally of an earlier, interrupted run to continue it. The tally of a whole run may continue to another number of histories.
     ///
     /// # Errors
-    /// [`TallyError`] when the file cannot be read, is damaged, or is of another simulation or part.
+    /// [`TallyError`] if the file cannot be read, is damaged, or belongs to another simulation or part.
     #[cfg(feature = "files")]
     pub fn read(&self, path: &Path, part: Part) -> Result<AnalogTally, TallyError> {
         self.resume(AnalogTally::read(path)?, path, part)
     }
 
-    /// As [`Self::read`], with the tally that was read from `path`.
+    /// The same as [`Self::read`] for a tally already read from `path`.
     #[cfg(feature = "files")]
     pub(crate) fn resume(
         &self,
@@ -176,7 +176,7 @@ impl<'a> AnalogRun<'a> {
         Ok(tally)
     }
 
-    /// Refuses a tally, read from `path`, that is not of all histories of this run.
+    /// Returns an error if the tally, read from `path`, does not cover all histories of this run.
     #[cfg(feature = "files")]
     pub(crate) fn check_whole(&self, tally: &AnalogTally, path: &Path) -> Result<(), TallyError> {
         self.check_key(tally, path)?;
@@ -207,7 +207,7 @@ impl<'a> AnalogRun<'a> {
         }
     }
 
-    /// SHA-256 of everything that decides what a history leaves.
+    /// SHA-256 of everything that determines the result of a history.
     pub(crate) fn key(&self) -> &str {
         self.key.get_or_init(|| {
             let Transport {
@@ -221,14 +221,14 @@ impl<'a> AnalogRun<'a> {
         })
     }
 
-    /// Follows the histories that `tally` still lacks, until `stop` or the observer says so.
+    /// Follows the histories missing from `tally` until `stop` or the observer ends the run.
     ///
-    /// `observe` receives the progress a few times per second and ends the run by [`ControlFlow::Break`]; whenever it
-    /// is called and at the end, the tally is whole and may be written. When [`Stop`] ends a run that is not in
-    /// parts, the run is complete at the histories counted until then.
+    /// `observe` receives the progress a few times per second and ends the run by [`ControlFlow::Break`]. Whenever it
+    /// is called and at the end, the tally is consistent and may be written. If [`Stop`] ends a run that is not in
+    /// parts, the run is complete with the histories counted so far.
     ///
     /// # Errors
-    /// [`RunError`] if `tally` is of another run.
+    /// [`RunError`] if `tally` belongs to another run.
     pub fn follow(
         &self,
         tally: &mut AnalogTally,
@@ -275,7 +275,7 @@ impl<'a> AnalogRun<'a> {
                 let until = stop
                     .time
                     .map_or(CHECK_EVERY, |time| CHECK_EVERY.min(time - elapsed));
-                // The rate of the first moments says little: no jumps.
+                // The rate is unreliable at first, so limit the growth.
                 batch = ((rate * until.as_secs_f64()) as u64).clamp(LEAST_BATCH, 2 * batch);
             }
             let mut end = tally.done.end + left.min(batch);
@@ -286,7 +286,7 @@ impl<'a> AnalogRun<'a> {
         }
     }
 
-    /// Counts on to the history `end`.
+    /// Counts the histories up to `end`.
     fn count(&self, tally: &mut AnalogTally, end: u64) {
         let histories = tally.done.end..end;
         let (exposure, seed) = (&self.exposure, self.settings.seed);
@@ -316,7 +316,7 @@ impl<'a> AnalogRun<'a> {
     }
 }
 
-/// What a run will still take: until the first of all that may end it.
+/// Estimates the rest of a run: until the first of all stopping rules applies.
 fn foresee(
     tally: &AnalogTally,
     stop: &Stop,
@@ -330,7 +330,7 @@ fn foresee(
         expected = expected.min(counted + rate * time.saturating_sub(elapsed).as_secs_f64());
     }
     if let (Some(target), Some(error)) = (stop.relative_error, relative_error) {
-        // The error falls as one over the root of the histories.
+        // The error falls as one over the square root of the histories.
         expected = expected.min(counted * (error / target).powi(2));
     }
     let remaining_s = (expected - counted).max(0.0) / rate;

@@ -13,19 +13,19 @@ use crate::transport::tally::Tally;
 
 /// Integer sums over a range of the histories of one run.
 ///
-/// Sums of the same histories are the same bytes, however they were counted and merged.
+/// Sums of the same histories have the same bytes, however they were counted and merged.
 #[derive(Debug)]
 pub struct AnalogTally {
     pub(crate) setup: RunSetup,
-    /// Histories that this tally is for.
+    /// Histories that this tally covers when complete.
     pub(crate) part: Range<u64>,
-    /// Histories counted, from the start of the part on.
+    /// Histories counted, from the start of the part.
     pub(crate) done: Range<u64>,
     pub(crate) image: Tally,
     pub(crate) dose: Option<DoseTally>,
 }
 
-/// What all parts of a run share.
+/// Data shared by all parts of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RunSetup {
@@ -53,7 +53,7 @@ impl AnalogTally {
         self.done.clone()
     }
 
-    /// Histories that this tally is for.
+    /// Histories that this tally covers when complete.
     pub fn part(&self) -> Range<u64> {
         self.part.clone()
     }
@@ -63,12 +63,12 @@ impl AnalogTally {
         self.setup.histories
     }
 
-    /// Whether the tally is for all histories of its run.
+    /// Whether the tally covers all histories of its run.
     pub(crate) fn is_whole_run(&self) -> bool {
         self.part == (0..self.setup.histories)
     }
 
-    /// A run that is not in parts becomes one of the histories counted so far.
+    /// Shortens a run that is not in parts to the histories counted so far.
     pub(crate) fn end_here(&mut self) {
         if self.is_whole_run() {
             self.part = self.done.clone();
@@ -77,7 +77,7 @@ impl AnalogTally {
     }
 
     /// Median over the pixels of the relative standard error of the image's total, blur and electronic noise included; infinite
-    /// for pixels that nothing has reached.
+    /// for pixels without hits.
     pub fn relative_error(&self) -> f64 {
         let image = self.radiograph();
         let pixels = image.sigma().into_iter().zip(image.total());
@@ -101,20 +101,20 @@ impl AnalogTally {
             .radiograph(&self.image, self.counted(), self.setup.seed)
     }
 
-    /// The doses of the histories counted so far, if they were asked for.
+    /// The doses of the histories counted so far, if they are counted.
     pub fn dose(&self) -> Option<Dose> {
         let (setup, tally) = (self.setup.dose.as_ref()?, self.dose.as_ref()?);
         Some(setup.report(tally, self.counted(), self.setup.image.histories_per_mas))
     }
 
-    /// Number of histories counted; 1 for none, so that means are zeros.
+    /// Number of histories counted, or 1 if there are none, so that means are zero.
     fn counted(&self) -> u64 {
         (self.done.end - self.done.start).max(1)
     }
 }
 
 impl RunSetup {
-    /// Bytes of the sums and masses of a tally, unless they are beyond all memory or the sizes make no sense.
+    /// Bytes of the sums and masses of a tally, or `None` if they overflow or the sizes are invalid.
     pub fn sums_len(&self) -> Option<u64> {
         let image = Tally::byte_len_of(&self.image.detector.raster())? as u64;
         if image == 0 {

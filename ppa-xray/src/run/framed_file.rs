@@ -1,4 +1,4 @@
-//! The frame of files that hold the state of a run.
+//! Frame format of files that hold the state of a run.
 //!
 //! Layout, little-endian: the magic bytes, the format version (u32), the length of the header (u32), the header as JSON,
 //! the sums, and the SHA-256 of all that.
@@ -18,16 +18,16 @@ const START_LEN: usize = 16;
 
 const HASH_LEN: usize = 32;
 
-/// Names and regions fit many times.
+/// Upper limit; names and regions are much shorter.
 const LONGEST_HEADER: u64 = 1 << 24;
 
-/// One kind of file.
+/// A kind of file.
 pub(crate) struct Frame {
     pub magic: [u8; 8],
     pub format: u32,
 }
 
-/// Bytes on their way to `out`.
+/// Writes to `out` and hashes the bytes.
 pub(crate) struct Hashed<W> {
     out: W,
     hash: Sha256,
@@ -88,7 +88,7 @@ impl Frame {
         out.write_all(&hash.finalize())
     }
 
-    /// Bytes that [`Self::write`] writes with sums of `sums_len` bytes.
+    /// Number of bytes that [`Self::write`] writes with sums of `sums_len` bytes.
     ///
     /// # Panics
     /// If a number in the header is not finite.
@@ -96,8 +96,8 @@ impl Frame {
         (START_LEN + json(header).len() + HASH_LEN) as u64 + sums_len
     }
 
-    /// Header and sums of a file of `found` bytes; `sums_len` says how many bytes of sums a header announces, `None` if that
-    /// makes no sense. Errors name `path`.
+    /// Reads the header and the sums of a file of `found` bytes. `sums_len` returns the bytes of sums that a header announces, or `None` if
+    /// the header is invalid. Errors name `path`.
     pub fn read<H: DeserializeOwned>(
         &self,
         path: &Path,
@@ -132,7 +132,7 @@ impl Frame {
         Ok((header, sums))
     }
 
-    /// As [`Self::read`], without the sums: the header and the bytes that were read.
+    /// The same as [`Self::read`], without the sums: returns the header and the number of bytes read.
     pub fn read_header<H: DeserializeOwned>(
         &self,
         path: &Path,
@@ -155,7 +155,7 @@ impl Frame {
             expected,
         };
         let mut bytes = vec![0; START_LEN];
-        // Whatever is too short for the first numbers is not a tally.
+        // A file too short for the first numbers is not a tally.
         file.read_exact(&mut bytes)
             .map_err(|source| match source.kind() {
                 ErrorKind::UnexpectedEof => foreign(),

@@ -10,11 +10,11 @@ use crate::dose::settings::DoseSettings;
 use crate::engine::analog::AnalogSettings;
 use crate::phantom::voxels::VoxelPhantom;
 
-/// SHA-256, in hexadecimal, of everything that decides what a history leaves: phantom, spectrum, exposure, models, doses
-/// asked for, seed and version of this crate. The number of histories is no part of it.
+/// SHA-256, in hexadecimal, of everything that determines the result of a history: phantom, spectrum, exposure, models, requested
+/// doses, seed and version of this crate. The number of histories is not included.
 ///
-/// Settings enter by their `Debug` text, which shows every field and every number exactly, so that a new field cannot be
-/// forgotten here; the voxels enter by their bytes.
+/// Settings enter as their `Debug` text, which shows every field and the exact value of every number, so that a new field cannot be
+/// forgotten here. The voxels enter as bytes.
 pub(crate) fn key(
     phantom: &VoxelPhantom,
     spectrum: &Spectrum,
@@ -47,7 +47,7 @@ pub(crate) fn key(
     hex(&hash.0.finalize())
 }
 
-/// Bytes in hexadecimal.
+/// Formats bytes in hexadecimal.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

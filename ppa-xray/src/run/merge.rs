@@ -7,13 +7,13 @@ use crate::run::analog_tally::AnalogTally;
 use crate::run::tally_error::TallyError;
 
 impl AnalogTally {
-    /// The tally of a whole run from the files of its parts, in any order; its bytes are those of a run in one part.
+    /// Merges the files of the parts of a run, in any order, into one tally with the same bytes as that of an undivided run.
     ///
-    /// Holds two tallies and the bytes of one in memory, whatever the number of files.
+    /// Holds two tallies and the bytes of one in memory, for any number of files.
     ///
     /// # Errors
-    /// [`TallyError`] naming the file for a part that cannot be read, is unfinished or is of another run; the histories
-    /// for parts that overlap or leave a hole.
+    /// [`TallyError`] naming the file if a part cannot be read, is unfinished or belongs to another run; naming the histories
+    /// if parts overlap or leave a gap.
     pub fn merge(paths: &[impl AsRef<Path>]) -> Result<Self, TallyError> {
         let (first_path, others) = paths.split_first().ok_or(TallyError::Nothing)?;
         let mut all = Self::read(first_path.as_ref())?;
@@ -58,7 +58,7 @@ impl AnalogTally {
         Ok(())
     }
 
-    /// `None` on overflow.
+    /// Adds the other sums; `None` on overflow.
     fn add(&mut self, other: &Self) -> Option<()> {
         self.image.add_bytes(&other.image.to_bytes())?;
         if let (Some(dose), Some(other)) = (&mut self.dose, &other.dose) {
@@ -68,7 +68,7 @@ impl AnalogTally {
     }
 }
 
-/// The histories of a part, all counted.
+/// Returns the histories of a part, or an error if they are not all counted.
 fn finished(tally: &AnalogTally, path: &Path) -> Result<(Range<u64>, PathBuf), TallyError> {
     if tally.done != tally.part {
         return Err(TallyError::Unfinished {
@@ -80,7 +80,7 @@ fn finished(tally: &AnalogTally, path: &Path) -> Result<(Range<u64>, PathBuf), T
     Ok((tally.part.clone(), path.into()))
 }
 
-/// Whether the parts cover `0..histories` once.
+/// Checks that the parts cover `0..histories` exactly once.
 fn check_cover(mut parts: Vec<(Range<u64>, PathBuf)>, histories: u64) -> Result<(), TallyError> {
     parts.retain(|(part, _)| !part.is_empty());
     parts.sort_by_key(|(part, _)| (part.start, part.end));

@@ -1,52 +1,52 @@
-//! Stopping rules, and progress.
+//! Stopping rules and progress of a run.
 
 use std::time::Duration;
 
-/// When a run ends before all its histories are followed. The default is: never.
+/// Conditions that end a run before all its histories are followed. By default there are none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stop {
-    /// After this wall-clock time.
+    /// Wall-clock time limit.
     pub time: Option<Duration>,
-    /// When the median pixel is this precise: the median over the detector of the relative standard error of the total
-    /// reading, blur and electronic noise included, as a fraction. Pixels that nothing has reached count as infinitely wrong.
+    /// Precision to reach: the median over the detector of the relative standard error of the total
+    /// reading, blur and electronic noise included, as a fraction. The error of pixels without hits counts as infinite.
     ///
-    /// Looked at at fixed numbers of histories that grow by a tenth, so that the same seed stops at the same history
+    /// Checked at fixed numbers of histories that grow by a tenth, so that the same seed stops at the same history
     /// on any machine and after any interruption.
     pub relative_error: Option<f64>,
 }
 
-/// Why following ended.
+/// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stopped {
     /// All histories are followed.
     Complete,
-    /// [`Stop::time`] is over.
+    /// The time limit [`Stop::time`] has passed.
     Time,
     /// [`Stop::relative_error`] is reached.
     Precise,
-    /// The observer said so.
+    /// The observer ended the run.
     Interrupted,
 }
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Histories counted in the tally, those of earlier, interrupted runs included.
     pub histories: u64,
-    /// Histories that will be counted in the end, as far as is known.
+    /// Expected final number of histories, as far as is known.
     pub expected_histories: u64,
     /// Time since the call began.
     pub elapsed: Duration,
     /// Estimated time left, once a rate is known.
     pub remaining: Option<Duration>,
-    /// The error that [`Stop::relative_error`] is compared with, when last looked at.
+    /// The error compared with [`Stop::relative_error`], as of the last check.
     pub relative_error: Option<f64>,
 }
 
-/// First number of histories at which the precision is looked at.
+/// First number of histories at which the precision is checked.
 const FIRST_CHECK: u64 = 65_536;
 
-/// The next number of histories above `histories` at which the precision is looked at.
+/// The next number of histories above `histories` at which the precision is checked.
 pub(crate) fn next_check(histories: u64) -> u64 {
     let mut check = FIRST_CHECK;
     while check <= histories {
@@ -55,7 +55,7 @@ pub(crate) fn next_check(histories: u64) -> u64 {
     check
 }
 
-/// Whether the precision is looked at here.
+/// Whether the precision is checked at this number of histories.
 pub(crate) fn is_check(histories: u64) -> bool {
     histories > 0 && next_check(histories - 1) == histories
 }

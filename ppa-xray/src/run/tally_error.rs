@@ -1,4 +1,4 @@
-//! Errors of reading, writing, continuing or merging tallies.
+//! Errors of tally files.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -7,29 +7,29 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TallyError {
-    /// The file system said no.
+    /// The file could not be read.
     #[error("cannot read the tally {}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file system.
         source: std::io::Error,
     },
-    /// The file system said no.
+    /// The file could not be written.
     #[error("cannot write the tally {}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file system.
         source: std::io::Error,
     },
-    /// The file does not begin as a tally does.
+    /// The file does not begin like a tally.
     #[error("{} is not a tally of ppa-xray", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
     },
-    /// The layout is of another version.
+    /// The format version of the file is not supported.
     #[error("{} has tally format {found}, expected {expected}", path.display())]
     Format {
         /// The file.
@@ -39,7 +39,7 @@ pub enum TallyError {
         /// Version of this program.
         expected: u32,
     },
-    /// The file ends early or continues.
+    /// The file is shorter or longer than announced.
     #[error("{} is {found} bytes long, expected {expected}: it was truncated or appended to", path.display())]
     Size {
         /// The file.
@@ -49,12 +49,12 @@ pub enum TallyError {
         /// Bytes that its header announces.
         expected: u64,
     },
-    /// Bytes were changed.
+    /// The bytes of the file were changed.
     #[error("{} is damaged: {what}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What does not fit.
+        /// What is inconsistent.
         what: String,
     },
     /// Phantom, spectrum, exposure, models, seed or code differ.
@@ -70,7 +70,7 @@ pub enum TallyError {
         /// Key of the simulation, or of the first file.
         expected: String,
     },
-    /// The histories of the whole run differ.
+    /// The numbers of histories of the whole run differ.
     #[error("{} belongs to a run of {found} histories, expected {expected}", path.display())]
     Histories {
         /// The file.
@@ -80,7 +80,7 @@ pub enum TallyError {
         /// Histories of the run, or of the first file.
         expected: u64,
     },
-    /// A part was not finished.
+    /// A part is not finished.
     #[error(
         "{} holds the histories {} to {} of its part, {} to {}: resume it first",
         path.display(), done.start, done.end, part.start, part.end
@@ -93,7 +93,7 @@ pub enum TallyError {
         /// Histories of the part.
         part: Range<u64>,
     },
-    /// A part is another one than asked for.
+    /// The file holds another part than the requested one.
     #[error(
         "{} is for the histories {} to {} of its run, expected {} to {}",
         path.display(), found.start, found.end, expected.start, expected.end
@@ -103,7 +103,7 @@ pub enum TallyError {
         path: PathBuf,
         /// Histories of the part in the file.
         found: Range<u64>,
-        /// Histories of the part asked for.
+        /// Histories of the requested part.
         expected: Range<u64>,
     },
     /// Two parts hold the same histories.
@@ -115,11 +115,11 @@ pub enum TallyError {
     Overlap {
         /// The part that begins first.
         first_path: PathBuf,
-        /// Its histories.
+        /// Histories of the first part.
         first: Range<u64>,
         /// The other part.
         second_path: PathBuf,
-        /// Its histories.
+        /// Histories of the second part.
         second: Range<u64>,
     },
     /// Histories are missing.

@@ -1,7 +1,7 @@
 //! Tally files.
 //!
-//! The frame of [`framed_file`](crate::run::framed_file) round the sums of the image (u64: energy and squared energy per cell and
-//! category), then with doses the masses of the voxels (f32) and the sums (u128 and u64).
+//! The frame of [`framed_file`](crate::run::framed_file) contains the sums of the image (u64: energy and squared energy per cell and
+//! category), followed with doses by the masses of the voxels (f32) and the sums (u128 and u64).
 
 use std::io::{self, Read, Write};
 use std::ops::Range;
@@ -30,9 +30,9 @@ struct Header {
 /// Histories of a tally file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TallyHistories {
-    /// Those that the tally is for.
+    /// Histories that the tally covers when complete.
     pub part: Range<u64>,
-    /// Those that are counted, from the start of the part on.
+    /// Histories counted, from the start of the part.
     pub done: Range<u64>,
     /// Number of histories of the whole run.
     pub of_run: u64,
@@ -58,7 +58,7 @@ impl Header {
 }
 
 impl AnalogTally {
-    /// Writes the tally; the file appears whole or not at all.
+    /// Writes the tally. The file is written completely or not at all.
     ///
     /// # Errors
     /// [`TallyError::Write`].
@@ -84,7 +84,7 @@ impl AnalogTally {
         })
     }
 
-    /// Bytes that [`Self::write`] would write now; they hardly change while histories are counted.
+    /// Number of bytes that [`Self::write`] would write now; it hardly changes while histories are counted.
     pub fn file_bytes(&self) -> u64 {
         let sums_len = self.setup.sums_len().expect("the sums are in memory");
         FRAME.file_len(&self.header(), sums_len)
@@ -101,16 +101,16 @@ impl AnalogTally {
     /// Reads a tally.
     ///
     /// # Errors
-    /// [`TallyError`] for a file that is not a tally, cut off or damaged.
+    /// [`TallyError`] for a file that is not a tally, is truncated or is damaged.
     pub fn read(path: &Path) -> Result<Self, TallyError> {
         let (file, found) = open(path)?;
         Self::read_from(path, file, found)
     }
 
-    /// The histories of a tally file. Its sums are not read, so that damage to them is not found.
+    /// Reads the histories of a tally file. The sums are not read, so damage to them is not detected.
     ///
     /// # Errors
-    /// [`TallyError`] for a file that is not a tally, or cut off.
+    /// [`TallyError`] for a file that is not a tally, or is truncated.
     pub fn read_histories(path: &Path) -> Result<TallyHistories, TallyError> {
         let (file, found) = open(path)?;
         let sums_len = |header: &Header| header.run.sums_len();
@@ -118,7 +118,7 @@ impl AnalogTally {
         header.histories(path)
     }
 
-    /// As [`Self::read`], from `found` bytes that belong to the file `path`.
+    /// The same as [`Self::read`], from `found` bytes of the file `path`.
     pub(crate) fn read_from(path: &Path, file: impl Read, found: u64) -> Result<Self, TallyError> {
         let damaged = |what: &str| TallyError::Damaged {
             path: path.into(),

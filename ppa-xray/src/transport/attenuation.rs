@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::matter::sampler::MaterialTables;
 
-/// 2⁹ nodes in every octave of energy: linear interpolation of E⁻³ errs by less than 6e-6.
+/// 2⁹ nodes per octave of energy: the error of linear interpolation of E⁻³ is below 6e-6.
 const OCTAVE_BITS: u32 = 9;
 
 /// Energies are distinguished by the leading bits of their `f32`.
@@ -13,20 +13,20 @@ const SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - OCTAVE_BITS;
 
 const FIRST_KEY: u32 = (CUTOFF_KEV as f32).to_bits() >> SHIFT;
 
-/// Nodes, of which the last lies at or above [`MAX_ENERGY_KEV`].
+/// Number of nodes; the last is at or above [`MAX_ENERGY_KEV`].
 pub(crate) const NODES: usize =
     (((MAX_ENERGY_KEV as f32).to_bits() >> SHIFT) + 2 - FIRST_KEY) as usize;
 
-/// Running sums of the interaction coefficients, mm⁻¹ per g/cm³.
+/// Cumulative sums of the interaction coefficients, mm⁻¹ per g/cm³.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Coefficients {
     pub photoelectric: f32,
     pub with_compton: f32,
-    /// All three: photoelectric, Compton and Rayleigh.
+    /// Sum of photoelectric, Compton and Rayleigh.
     pub total: f32,
 }
 
-/// Place of an energy between two nodes.
+/// Position of an energy between two nodes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct EnergyNode {
     pub node: u32,
@@ -36,7 +36,7 @@ pub(crate) struct EnergyNode {
 /// Coefficients of all materials from [`CUTOFF_KEV`] to [`MAX_ENERGY_KEV`].
 #[derive(Debug)]
 pub(crate) struct Attenuation {
-    /// Material by material, node by node: photoelectric, with Compton, total, and nothing, so that a node is 16 bytes.
+    /// By material and node: photoelectric, photoelectric plus Compton, total, and padding to 16 bytes per node.
     table: Vec<[f32; 4]>,
 }
 
@@ -61,7 +61,7 @@ impl Attenuation {
         }
     }
 
-    /// Where `energy_kev` lies; energies beyond the table go to its ends.
+    /// Position of `energy_kev`; energies beyond the table go to its ends.
     #[inline]
     pub fn locate(&self, energy_kev: f64) -> EnergyNode {
         let bits = (energy_kev as f32).to_bits();
@@ -114,7 +114,7 @@ mod tests {
     use crate::matter::compton::ComptonModel;
     use crate::matter::material::Material;
 
-    /// Interpolation follows the cross sections it was made from, edges apart (none of water's lies above 5 keV).
+    /// Interpolation follows the cross sections it was made from, except at edges (water has none above 5 keV).
     #[test]
     fn coefficients_are_those_of_the_material() {
         let tables = [MaterialTables::new(

@@ -1,23 +1,23 @@
-//! Blocks of voxels by opacity.
+//! Classification of blocks of voxels by opacity.
 
 use rayon::prelude::*;
 
 use crate::transport::voxel_codes::VoxelCodes;
 
-/// Classes of blocks at most.
+/// Largest number of classes.
 pub(super) const MOST_CLASSES: usize = 64;
 
-/// A bound below this would let the free path overflow; mm⁻¹.
+/// Lower limit of the bounds, so that the free path does not overflow; mm⁻¹.
 const VACUUM: f32 = 1e-12;
 
-/// Largest density of every material in every block and `halo` voxels around it, g/cm³.
+/// Largest density of every material in every block and the `halo` voxels around it, g/cm³.
 pub(super) fn densest_per_block(
     codes: &VoxelCodes,
     halo: usize,
     (edge, blocks): (usize, [usize; 3]),
     materials: usize,
 ) -> Vec<f32> {
-    // Places in the codes: the rim takes the first.
+    // Positions in the codes; the rim takes the first.
     let places = |block: usize, axis: usize| {
         let first = 1 + block * edge;
         first - halo..(first + edge + halo).min(codes.size()[axis] - 1 + halo)
@@ -44,8 +44,8 @@ pub(super) fn densest_per_block(
 
 /// Class of every block, and the largest density per material of every class and those below it.
 ///
-/// Classes follow the attenuation at the typical energy, `mu` per density and material. If there are too many different ones,
-/// they are distinguished by fewer digits.
+/// Classes follow the attenuation at the typical energy, `mu` per density and material. If there are too many different values,
+/// they are truncated to fewer digits.
 pub(super) fn classify(densest: &[f32], mu: &[f32]) -> (Vec<u16>, Vec<f32>) {
     let materials = mu.len();
     let opacity: Vec<u32> = densest

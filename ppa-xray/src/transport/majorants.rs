@@ -19,9 +19,9 @@ const TYPICAL_KEV: f64 = 40.0;
 
 /// Upper bounds of the attenuation in cubes of blocks.
 ///
-/// A local bound keeps a small dense implant from slowing down the whole box. Blocks that are about as opaque as each other
-/// share a class; classes are ordered, and a class bounds all below it too. Every block knows how many blocks around it may
-/// share its bound, or that of a more opaque neighbour: photons cross a large even region in one step.
+/// Local bounds prevent a small dense implant from slowing down the entire box. Blocks of similar opacity
+/// share a class; classes are ordered, and the bound of a class is valid for all lower ones. Every block stores how many blocks around it
+/// may share its bound, or that of a more opaque neighbour, so photons cross a large uniform region in one step.
 #[derive(Debug)]
 pub(crate) struct Majorants {
     /// Voxels along the edge of a block; a power of two, so that its inverse is exact.
@@ -43,12 +43,13 @@ pub(crate) struct Region {
 }
 
 impl Majorants {
-    /// Bounds for a box of voxels with a mean side of `voxel_mm`, in blocks of [`EDGE`]; they cover `halo` voxels around each block.
+    /// Computes bounds for a box of voxels with a mean side of `voxel_mm`, in blocks of [`EDGE`]; they cover `halo` voxels around each
+    /// block.
     pub fn new(codes: &VoxelCodes, halo: usize, voxel_mm: f64, attenuation: &Attenuation) -> Self {
         Self::in_blocks(EDGE, codes, halo, voxel_mm, attenuation)
     }
 
-    /// As [`Majorants::new`], in blocks of `edge` voxels.
+    /// The same as [`Majorants::new`], in blocks of `edge` voxels.
     pub fn in_blocks(
         edge: u32,
         codes: &VoxelCodes,
@@ -102,7 +103,7 @@ fn largest_in_row(attenuation: &Attenuation, row: usize) -> Vec<f32> {
         .collect()
 }
 
-/// mm⁻¹ per row and class.
+/// Bounds in mm⁻¹ per row and class.
 fn bounds(members: &[f32], attenuation: &Attenuation) -> Vec<f32> {
     (0..ROWS)
         .into_par_iter()
@@ -116,10 +117,10 @@ fn bounds(members: &[f32], attenuation: &Attenuation) -> Vec<f32> {
         .collect()
 }
 
-/// For every block the cube around it that costs a photon the fewest steps.
+/// For every block, the cube around it that minimises the expected steps of a photon.
 fn regions(class: &[u16], blocks: [usize; 3], typical_mm: &[f32], block_mm: f64) -> Vec<Region> {
     const FARTHEST: u16 = 15;
-    // A tentative collision costs about twice the crossing of a wall.
+    // A tentative collision costs about twice as much as crossing a wall.
     let cost_per_mm = |region: &Region| {
         let side_mm = f64::from(2 * u32::from(region.reach) + 1) * block_mm;
         2.0 * f64::from(typical_mm[usize::from(region.class)]) + 2.0 / side_mm
@@ -128,7 +129,7 @@ fn regions(class: &[u16], blocks: [usize; 3], typical_mm: &[f32], block_mm: f64)
         .iter()
         .map(|&class| Region { class, reach: 0 })
         .collect();
-    // The highest class in the cube of every block, grown by one block on all sides each time.
+    // The highest class in the cube around every block, which grows by one block on all sides each time.
     let mut highest = class.to_vec();
     for reach in 1..=FARTHEST {
         let mut stride = 1;
@@ -170,7 +171,7 @@ mod tests {
     use crate::transport::tally::Category;
     use crate::transport::voxel_codes::VoxelCode;
 
-    /// Woodcock tracking is right only if no voxel exceeds the bound of any cube that holds it.
+    /// Woodcock tracking is correct only if no voxel exceeds the bound of any cube that contains it.
     #[test]
     fn no_voxel_exceeds_the_bound_of_a_cube_around_it() {
         let tables = ["air", "soft_tissue", "bone_cortical", "titanium"].map(|name| {
@@ -179,7 +180,7 @@ mod tests {
         let attenuation = Attenuation::new(&tables);
         let size = [61, 83, 70];
         let coordinates = |n: usize| [n % 61, n / 61 % 83, n / (61 * 83)];
-        // Many densities, so that blocks must share classes.
+        // Many densities, so that blocks have to share classes.
         let scramble = |n: usize| (n.wrapping_mul(2_654_435_761) >> 7) % 10_007;
         let code = |n: usize| {
             let [i, j, k] = coordinates(n);
@@ -208,7 +209,7 @@ mod tests {
                     let total = attenuation.at(code(voxel).material(), energy).total;
                     let mu = code(voxel).density_g_cm3() * total;
                     let home = coordinates(voxel);
-                    // Every block whose cube reaches the voxel.
+                    // Every block whose cube contains the voxel.
                     for n in 0..majorants.regions.len() {
                         let at = [
                             n % blocks[0],
@@ -237,7 +238,7 @@ mod tests {
     }
 
     /// The image of 3e5 histories in blocks of 1, 4 and 64 voxels against blocks of 8: 12 differences of sums beyond 4.5
-    /// standard errors raise a false alarm once in 1e4. A bound that is too low by 10 % shows at 6 and more.
+    /// standard errors raise a false alarm once in 1e4. A bound that is too low by 10 % deviates by 6 or more.
     #[test]
     fn no_expectation_depends_on_the_size_of_the_blocks() {
         let (phantom, spectrum, projection) = crate::engine::small_limb::exposure();

@@ -1,7 +1,7 @@
-//! Photons on their way through the phantom to the detector.
+//! Transport of photons through the phantom to the detector.
 //!
 //! The analog engine follows 6 to 15 times as many histories per processor second as the CPU build of MC-GPU v1.3, and up to
-//! 66 times as many where metal is in the box (bench `transport`, docs/performance.md).
+//! 66 times as many if there is metal in the box (bench `transport`, docs/performance.md).
 
 pub(crate) mod attenuation;
 mod block_classes;

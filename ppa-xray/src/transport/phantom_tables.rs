@@ -1,4 +1,4 @@
-//! What transport needs of a phantom, whatever the exposure is.
+//! Tables of a phantom that the transport needs for any exposure.
 
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
@@ -40,22 +40,22 @@ impl<'a> PhantomTables<'a> {
         }
     }
 
-    /// Bounds for Woodcock tracking. Ask for them once before threads follow histories, or each thread computes them.
+    /// Bounds for Woodcock tracking. Call this once before threads follow histories; otherwise each thread computes them.
     pub fn majorants(&self) -> &Majorants {
         if let Some(majorants) = self.majorants.get() {
             return majorants;
         }
-        // Made before the cell is locked: a thread that waits for others meanwhile may be handed histories that need the cell.
+        // Computed before the cell is locked: a thread that waits for others meanwhile may be given histories that need the cell.
         let voxel_mm = voxel_mm3(self.phantom.grid()).cbrt();
         let halo = self.phantom.interpolation().halo();
         let majorants = Majorants::new(&self.codes, halo, voxel_mm, &self.attenuation);
         self.majorants.get_or_init(|| majorants)
     }
 
-    /// What a photon meets at a place in the box, in cells from its corner.
+    /// Samples material and density at a point in the box, in cells from its corner.
     ///
-    /// Trilinear interpolation is the mean of the voxels at this place plus an offset that is uniform over one voxel. So one of the eight
-    /// neighbours, each with the probability of its weight, stands for the density of all materials there.
+    /// Trilinear interpolation is the mean of the voxels at this point plus an offset that is uniform over one voxel. So one of the eight
+    /// neighbours, chosen with the probability of its weight, represents the density of all materials there.
     #[inline]
     pub fn draw_code(&self, cell: &Vector3<f64>, rng: &mut Philox) -> VoxelCode {
         let corner = match self.phantom.interpolation() {

@@ -16,20 +16,20 @@ pub(crate) struct Arrival {
     pub category: Category,
 }
 
-/// Takes what histories leave. Several histories may be under way at once, each in a slot of its own.
+/// Receives the events of histories. Several histories may run at once, each in a slot of its own.
 pub(crate) trait Score {
     /// A photon leaves the source in `slot`.
     fn emit(&mut self, _slot: usize, _energy_kev: f64) {}
 
-    /// The history in `slot` leaves energy in a voxel of the phantom.
+    /// The history in `slot` deposits energy in a voxel of the phantom.
     fn deposit(&mut self, _slot: usize, _voxel: usize, _energy_kev: f64) {}
 
     /// The photon in `slot` crosses the detector plane; `rng` is that of its history.
     fn arrive(&mut self, slot: usize, arrival: &Arrival, rng: &mut Philox);
 
-    /// The photon in `slot` flies off without meeting the detector plane.
+    /// The photon in `slot` escapes without meeting the detector plane.
     fn escape(&mut self, _slot: usize, _energy_kev: f64) {}
 
-    /// The history in `slot` has ended; the next one takes its place.
+    /// The history in `slot` has ended; the next one reuses the slot.
     fn finish(&mut self, _slot: usize) {}
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crate::beam::raster::Raster;
 
-/// What happened to a detected photon on its way.
+/// Interactions of a detected photon on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Category {
     /// No interaction.
@@ -18,7 +18,7 @@ pub enum Category {
 }
 
 impl Category {
-    /// All four, in the order of the layers.
+    /// All four categories, in the order of the layers.
     pub const ALL: [Self; 4] = [Self::Primary, Self::Compton, Self::Rayleigh, Self::Multiple];
 
     /// Lower-case name, as in layer names and JSON keys.
@@ -32,7 +32,7 @@ impl Category {
     }
 }
 
-/// Most histories of a run: then no sum overflows, even if all photons of 150 keV meet in one cell.
+/// Largest number of histories of a run: no sum overflows, even if all photons of 150 keV hit one cell.
 pub(crate) const MOST_HISTORIES: u64 = 500_000_000_000;
 
 /// Energy quantum 1/64 eV: a cell holds 1.9e12 photons of 150 keV before it overflows.
@@ -41,16 +41,16 @@ const STEPS_PER_KEV: f64 = 64_000.0;
 /// Quantum of the squared energy, 2⁻¹⁰ keV²: room for 8e11 photons of 150 keV in one cell.
 const STEPS_PER_KEV2: f64 = 1_024.0;
 
-/// The nearest whole number to one that is not negative; `round` would be a call into the C library.
+/// Rounds a non-negative number to the nearest integer; `round` would be a call into the C library.
 #[inline]
 pub(crate) fn nearest(steps: f64) -> u64 {
-    // One instruction by way of i64.
+    // The cast through i64 is a single instruction.
     (steps + 0.5) as i64 as u64
 }
 
 /// Sums of energy and squared energy per cell and category.
 ///
-/// Integer additions commute, so any number of threads may add in any order and leave the same bytes.
+/// Integer additions commute, so any number of threads may add in any order and the bytes are the same.
 #[derive(Debug)]
 pub(crate) struct Tally {
     pub raster: Raster,
@@ -75,7 +75,7 @@ impl std::iter::Sum for Moments {
     }
 }
 
-/// Weights the moments of two kinds of photons, each per history of its own, by their shares of all histories; `share` is that of `those`.
+/// Mixes the moments, each per own history, of two kinds of photons by their shares of all histories; `share` is that of `those`.
 pub(crate) fn mix(these: &mut [Moments], those: &[Moments], share: f64) {
     for (this, that) in these.iter_mut().zip(those) {
         *this = [this.scaled(1.0 - share), that.scaled(share)]
@@ -85,7 +85,7 @@ pub(crate) fn mix(these: &mut [Moments], those: &[Moments], share: f64) {
 }
 
 impl Moments {
-    /// Both moments times `factor`.
+    /// Multiplies both moments by `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self {
             mean_kev: self.mean_kev * factor,
@@ -99,19 +99,19 @@ impl Moments {
     }
 }
 
-/// One photon for one cell.
+/// Contribution of one photon to one cell.
 #[derive(Debug, Clone, Copy)]
 struct Hit {
     cell: usize,
     category: Category,
     energy_kev: f64,
-    /// Share of the photon that is the cell's.
+    /// Share of the photon that belongs to the cell.
     share: f64,
 }
 
-/// Collects photons for a [`Tally`] and hands them over many at a time, at the latest when dropped.
+/// Collects photons for a [`Tally`] and adds them in batches, at the latest when dropped.
 ///
-/// Cells are hit all over the detector, mostly out of cache: reading the cells of all hits first lets these waits overlap,
+/// Hits are scattered over the detector, mostly outside the cache. Reading the cells of all hits first lets the cache misses overlap,
 /// which the additions, each a locked instruction, would not.
 #[derive(Debug)]
 pub(crate) struct TallyBuffer<'a> {
@@ -129,7 +129,7 @@ impl<'a> TallyBuffer<'a> {
         }
     }
 
-    /// Counts a photon that crosses the plane at device (x, y); outside the raster nothing happens.
+    /// Counts a photon that crosses the plane at device (x, y); photons outside the raster are ignored.
     #[inline]
     pub fn score(&mut self, x_mm: f64, y_mm: f64, category: Category, energy_kev: f64) {
         if let Some(cell) = self.tally.raster.cell_at(x_mm, y_mm) {
@@ -144,7 +144,7 @@ impl<'a> TallyBuffer<'a> {
 
     /// Counts a photon whose energy is spread over a square of `spot` cells, at most 1.
     ///
-    /// Its squared energy is shared out as its energy is: cells then show how many photons came with which energy,
+    /// Its squared energy is divided in the same way as its energy, so that each cell keeps the ratio of squared energy to energy,
     /// and sums over cells are those of whole photons.
     pub fn spread(&mut self, x_mm: f64, y_mm: f64, spot: f64, category: Category, energy_kev: f64) {
         let shares = self.tally.raster.cells_about(x_mm, y_mm, spot);
@@ -206,17 +206,17 @@ impl Tally {
         );
     }
 
-    /// Bytes of [`Tally::to_bytes`] for a raster, unless they are beyond all memory.
+    /// Number of bytes of [`Tally::to_bytes`] for a raster, or `None` on overflow.
     pub fn byte_len_of(raster: &Raster) -> Option<usize> {
         raster.columns.checked_mul(raster.rows)?.checked_mul(64)
     }
 
-    /// Bytes of [`Tally::to_bytes`].
+    /// Number of bytes of [`Tally::to_bytes`].
     pub fn byte_len(&self) -> usize {
         64 * self.sums.len()
     }
 
-    /// All sums, cell by cell, little-endian.
+    /// Serialises all sums, cell by cell, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {
         let words = self.sums.iter().flatten().flatten();
         words
@@ -224,7 +224,7 @@ impl Tally {
             .collect()
     }
 
-    /// Adds the sums of [`Tally::to_bytes`] of a tally of the same raster; `None` on overflow.
+    /// Adds the sums of [`Tally::to_bytes`] from a tally of the same raster; `None` on overflow.
     pub fn add_bytes(&mut self, bytes: &[u8]) -> Option<()> {
         assert_eq!(bytes.len(), self.byte_len(), "tallies of one raster");
         let sums = self.sums.iter_mut().flatten().flatten();

@@ -1,4 +1,4 @@
-//! Data common to all histories of a projection, checked before the first.
+//! Data shared by all histories of a projection, checked before the first one.
 
 use std::sync::Arc;
 
@@ -20,10 +20,10 @@ use crate::transport::phantom_tables::PhantomTables;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransportError {
-    /// Source, detector and phantom do not fit together.
+    /// Source, detector and phantom are not consistent.
     #[error(transparent)]
     Projection(#[from] ProjectionError),
-    /// The spectrum reaches outside the range of the transport.
+    /// The spectrum extends beyond the energy range of the transport.
     #[error(
         "{percent:.3} % of the spectrum lies outside {CUTOFF_KEV} to {MAX_ENERGY_KEV} keV, the range in which photons are tracked"
     )]
@@ -31,16 +31,16 @@ pub enum TransportError {
         /// Share of the photons outside the range.
         percent: f64,
     },
-    /// A material has no data where the spectrum has photons.
+    /// A material has no data at energies of the spectrum.
     #[error(
         "{percent:.3} % of the spectrum lies outside {low_kev} to {high_kev} keV, the range of the data of material {material:?}"
     )]
     MaterialRange {
-        /// The material.
+        /// Name of the material.
         material: String,
-        /// Its lowest energy.
+        /// Lowest energy of its data, keV.
         low_kev: f64,
-        /// Its highest energy.
+        /// Highest energy of its data, keV.
         high_kev: f64,
         /// Share of the photons outside the range.
         percent: f64,
@@ -55,38 +55,38 @@ pub enum TransportError {
         /// Model that the phantom was prepared for.
         prepared: ComptonModel,
     },
-    /// A tube load cannot be turned into histories.
+    /// A tube load cannot be converted to histories.
     #[error("cannot derive the number of histories from the tube load: {why}")]
     TubeLoad {
         /// What is missing.
         why: &'static str,
     },
-    /// The observer of the progress has cancelled the work.
+    /// The progress observer cancelled the work.
     #[error("the simulation was cancelled")]
     Cancelled,
     /// A number in the settings is out of range.
     #[error("{what} is {found:?}, expected {expected}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         what: &'static str,
-        /// What it was.
+        /// Value found.
         found: f64,
-        /// What it may be.
+        /// Allowed range.
         expected: &'static str,
     },
 }
 
-/// Tissue denser than this (lung, foam) may lie neither behind the detector nor on the source.
+/// Tissue denser than this (lung, foam) must not be behind the detector or at the source.
 pub(crate) const SOLID_G_CM3: f32 = 0.3;
 
-/// Everything the histories of one projection share.
+/// Data shared by the histories of one projection.
 pub(crate) struct Transport<'a> {
     pub tables: Arc<PhantomTables<'a>>,
     pub spectrum: &'a Spectrum,
     pub projection: &'a Projection,
     /// Photons of the focal spot.
     pub emitter: Emitter,
-    /// Photons from beside it.
+    /// Photons from the area around the focal spot.
     pub extrafocal: Option<ExtrafocalEmitter>,
     pub lattice: Lattice,
 }
@@ -134,7 +134,7 @@ impl<'a> Transport<'a> {
         })
     }
 
-    /// A photon of the tube, focal or extrafocal.
+    /// Samples a photon of the tube, focal or extrafocal.
     #[inline]
     pub fn emit(&self, rng: &mut Philox) -> Emission {
         match &self.extrafocal {
@@ -143,24 +143,24 @@ impl<'a> Transport<'a> {
         }
     }
 
-    /// The spectrum of a plain beam: all photons leave the origin, evenly in solid angle.
+    /// The spectrum of a plain beam, whose photons all leave the origin uniformly in solid angle.
     pub fn plain_beam(&self) -> Option<&Spectrum> {
         let spectrum = self.emitter.plain_beam()?;
         self.extrafocal.is_none().then_some(spectrum)
     }
 
-    /// Histories of one mAs: photons that the tube sends into the field, if the spectrum came from the tube model.
+    /// Histories per mAs: photons that the tube emits into the field, if the spectrum came from the tube model.
     pub fn histories_per_mas(&self) -> Option<f64> {
         ExtrafocalEmitter::histories_per_mas(&self.emitter, self.extrafocal.as_ref())
     }
 
-    /// Fluence per history with the collimator wide open, over that of the focal spot's photons per history of theirs.
+    /// Ratio of the fluence per history with the collimator fully open to that of the focal photons per focal history.
     pub fn open_over_focal(&self) -> f64 {
         let beside = self.extrafocal.as_ref();
         beside.map_or(1.0, ExtrafocalEmitter::open_over_focal)
     }
 
-    /// The same photons to another detector in the same plane.
+    /// Returns the same photons with another detector in the same plane.
     pub fn with_projection<'b>(&'b self, projection: &'b Projection) -> Transport<'b> {
         Transport {
             tables: self.tables.clone(),
@@ -172,7 +172,7 @@ impl<'a> Transport<'a> {
         }
     }
 
-    /// The same exposure by its extrafocal photons alone, and their share of the histories.
+    /// The same exposure with extrafocal photons only, and their share of the histories.
     pub fn of_extrafocal(&self) -> Option<(Self, f64)> {
         let beside = self.extrafocal.as_ref()?;
         let alone = Self {

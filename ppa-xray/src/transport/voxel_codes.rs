@@ -4,14 +4,14 @@ use rayon::prelude::*;
 
 use crate::phantom::voxels::VoxelPhantom;
 
-/// The upper 24 bits of the density as `f32`, within 1.6e-5 of it, and the material index below them.
+/// The upper 24 bits of the density as `f32`, accurate to 1.6e-5, with the material index below them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct VoxelCode(u32);
 
 impl VoxelCode {
     #[inline]
     pub fn new(material: u8, density_g_cm3: f32) -> Self {
-        // Densities are finite and not negative; beyond 1e30, attenuation might overflow, and no photon gets in anyway.
+        // Densities are finite and not negative. Beyond 1e30, attenuation might overflow, and no photon gets in anyway.
         let rounded = density_g_cm3.min(1e30).to_bits() + 0x80;
         Self(rounded & 0xFFFF_FF00 | u32::from(material))
     }
@@ -27,8 +27,8 @@ impl VoxelCode {
     }
 }
 
-/// Codes of all voxels, and of a rim of one voxel around the box that repeats the outermost ones: the eight neighbours of any
-/// place in the box have a code.
+/// Codes of all voxels, and of a rim of one voxel around the box that repeats the outermost ones, so the eight neighbours of any
+/// point in the box have a code.
 #[derive(Debug)]
 pub(crate) struct VoxelCodes {
     /// x fastest; voxel (i, j, k) of the phantom is (i + 1, j + 1, k + 1) here.
@@ -48,7 +48,7 @@ impl VoxelCodes {
     /// Codes by the index of the voxel in a phantom of `voxels` voxels.
     pub fn from_voxels(voxels: [usize; 3], of: impl Fn(usize) -> VoxelCode + Sync) -> Self {
         let size = voxels.map(|count| count + 2);
-        // The voxel that a place along an axis repeats.
+        // The voxel that is repeated at an index along an axis.
         let inside = |at: usize, axis: usize| at.saturating_sub(1).min(voxels[axis] - 1);
         let mut codes = vec![VoxelCode::default(); size.iter().product()];
         codes
@@ -71,7 +71,7 @@ impl VoxelCodes {
         self.size
     }
 
-    /// Index of a place that is counted from the corner of the rim.
+    /// Index of a voxel counted from the corner of the rim.
     #[inline(always)]
     pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         x + self.size[0] * (y + self.size[1] * z)

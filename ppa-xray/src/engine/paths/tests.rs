@@ -26,7 +26,7 @@ fn exposed(
     let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
     let inverse = projection.ct_from_device.inverse();
     let corners = phantom.corners_ct().map(|corner| inverse * corner);
-    // Ends of a path; some lie outside the box.
+    // Ends of a path; some are outside the box.
     let ends = |index: u64| {
         let mut rng = Philox::new(5, 0, index);
         [(); 2].map(|()| {
@@ -48,7 +48,7 @@ fn ball(at: Point3<f64>) -> (u8, f32) {
     }
 }
 
-/// The ball, in blocks of 16 voxels of 2 mm, begins at most one block behind the z that is found, and not before it.
+/// The ball, in blocks of 16 voxels of 2 mm, begins at most one block behind the computed z, and not before it.
 #[test]
 fn nothing_but_air_lies_below_the_nearest_z() {
     exposed(Interpolation::Trilinear, ball, |paths, _| {
@@ -99,7 +99,7 @@ fn uniform_blocks_change_no_path() {
     }
 }
 
-/// Where the density is a linear function of the place, that of the middle of a path is its mean.
+/// If the density is a linear function of the position, its value at the middle of a path is its mean.
 #[test]
 fn chords_of_a_linear_density_are_exact() {
     let density = |at: Point3<f64>| 1.0 + 0.004 * at.x - 0.007 * at.y + 0.003 * at.z;
@@ -121,7 +121,7 @@ fn chords_of_a_linear_density_are_exact() {
             inside += 1;
             let mut mass = [[0.0; LANES]];
             paths.between(&from, &to, &mut mass);
-            // All of it is one basis material or a mixture of them: compare attenuation at 60 keV with that of a gram.
+            // All of it is one basis material or a mixture of them, so compare the attenuation at 60 keV with that of a gram.
             let per_gram = paths.basis.exponent(paths.basis.shares(1), 60.0);
             let found = f64::from(paths.basis.exponent(&mass, 60.0) / per_gram);
             let expected =

@@ -1,8 +1,9 @@
 //! Integrals of the differential cross sections over all paths through the sphere.
 //!
-//! They involve no sampling of angles or free paths and no tracking: the nodes are the additive recurrence of irrational steps (Niederreiter,
-//! *Random Number Generation and Quasi-Monte Carlo Methods*, 1992, ch. 3), which fills the space of the paths evenly. Other starting points change
-//! the integrals by up to 0.4 % in a ring and 0.1 % in all (single scatter), 2 % and 0.4 % (multiple scatter).
+//! They involve no sampling of angles or free paths and no tracking: the nodes are the additive recurrence of irrational steps
+//! (Niederreiter, *Random Number Generation and Quasi-Monte Carlo Methods*, 1992, ch. 3), which fills the space of the paths evenly.
+//! Other starting points change the integrals by up to 0.4 % in a ring and 0.1 % overall (single scatter), 2 % and 0.4 % (multiple
+//! scatter).
 
 use std::f64::consts::PI;
 
@@ -14,7 +15,7 @@ use crate::engine::scatter_of_a_sphere::scene::{
 use crate::matter::cross_sections::{ELECTRON_REST_KEV, HC_KEV_ANGSTROM};
 use crate::matter::material::Material;
 
-/// One interaction: coefficient per solid angle in 1/(mm sr), and the energy afterwards.
+/// One interaction: coefficient per solid angle in 1/(mm sr), and the energy after it.
 pub(super) type Scatterer<'a> = &'a dyn Fn(f64, f64) -> (f64, f64);
 
 /// A Klein–Nishina differential cross section per electron, cm²/sr, and E′/E.
@@ -28,7 +29,7 @@ pub(super) fn klein_nishina(energy_kev: f64, cos: f64) -> (f64, f64) {
     )
 }
 
-/// ∫ f dΩ over the sphere, f a function of cos θ that peaks forwards.
+/// ∫ f dΩ over the sphere, where f is a forward-peaked function of cos θ.
 fn over_the_sphere(f: impl Fn(f64) -> f64) -> f64 {
     let n = 4_000;
     // cos θ = 1 − 2 u⁴ resolves the peak.
@@ -43,7 +44,7 @@ fn momentum(energy_kev: f64, cos: f64) -> f64 {
     (0.5 * (1.0 - cos)).sqrt() * energy_kev / HC_KEV_ANGSTROM
 }
 
-/// Coefficients of the two scatterings, by interpolation over energy since their integrals take time.
+/// Coefficients of both kinds of scattering, interpolated over energy since their integrals take time.
 pub(super) struct Scattering {
     material: Material,
     density_g_cm3: f64,
@@ -120,7 +121,7 @@ pub(super) fn integrate(scene: &Scene, orders: &[Scatterer], nodes: usize) -> [f
     let volume_mm3 = 4.0 / 3.0 * PI * radius_mm.powi(3);
     let side_mm = f64::from(PIXELS) * PIXEL_MM;
     let source = Point3::new(0.0, 0.0, -SOURCE_MM);
-    // Length from a point in the sphere along a direction to its surface.
+    // Distance from a point in the sphere along a direction to its surface.
     let to_surface = |at: &Point3<f64>, direction: &Vector3<f64>| {
         let along = at.coords.dot(direction);
         -along
@@ -143,7 +144,7 @@ pub(super) fn integrate(scene: &Scene, orders: &[Scatterer], nodes: usize) -> [f
         weight *= (-scene.mu_per_mm(energy_kev) * to_surface(&at, &-direction)).exp();
         let (last, before) = orders.split_last().unwrap();
         for interaction in before {
-            // cos θ = 1 − 2 v² goes with the forward peak: dcos = 4 v dv.
+            // cos θ = 1 − 2 v² resolves the forward peak: dcos = 4 v dv.
             let v = u();
             let cos = 1.0 - 2.0 * v * v;
             let (per_mm_sr, energy_after) = interaction(energy_kev, cos);

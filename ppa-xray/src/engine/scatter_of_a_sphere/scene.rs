@@ -1,4 +1,4 @@
-//! The scene of the verification: a sphere of one material in the middle of a narrow beam, and a detector behind it in rings.
+//! The scene of the verification: a sphere of one material in the middle of a narrow beam, with a detector divided into rings behind it.
 
 use std::f64::consts::PI;
 
@@ -20,7 +20,7 @@ use crate::phantom::voxels::VoxelPhantom;
 /// Voxels across the sphere.
 const ACROSS: usize = 40;
 const RADIUS_MM: f64 = 4.0;
-/// From the focus to the middle of the sphere, and on to the detector.
+/// Distances from the focus to the middle of the sphere, and from there to the detector.
 pub(super) const SOURCE_MM: f64 = 300.0;
 pub(super) const BEHIND_MM: f64 = 80.0;
 /// Half the side of the field in the plane through the middle of the sphere.
@@ -51,7 +51,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Voxels whose centres lie in the sphere.
+    /// Voxels whose centres are in the sphere.
     pub(super) fn phantom(&self) -> (VoxelPhantom, f64) {
         let voxel_mm = 2.0 * RADIUS_MM / ACROSS as f64;
         let first = Point3::from(Vector3::repeat(0.5 * voxel_mm - RADIUS_MM));

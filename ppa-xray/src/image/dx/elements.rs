@@ -8,7 +8,7 @@ use dicom_object::InMemDicomObject;
 
 use crate::image::dx::examination::Code;
 
-/// A data set under construction.
+/// Builds a data set.
 pub(super) struct Elements(InMemDicomObject);
 
 impl Elements {
@@ -23,12 +23,12 @@ impl Elements {
         self.0.put(DataElement::new(tag, vr, value));
     }
 
-    /// Text; several values are parted by backslashes.
+    /// Text; several values are separated by backslashes.
     pub fn text(&mut self, tag: Tag, value: &str) {
         self.put(tag, value.into());
     }
 
-    /// No value: a type 2 attribute that is not known.
+    /// No value, for an unknown type 2 attribute.
     pub fn empty(&mut self, tag: Tag) {
         self.put(tag, PrimitiveValue::Empty);
     }
@@ -58,7 +58,7 @@ impl Elements {
         self.text(tag, &texts.join("\\"));
     }
 
-    /// A look-up table as a sequence of one item (PS3.3 C.11.2.1.1): 16-bit grey values of the stored values from `first` on.
+    /// A look-up table as a sequence of one item (PS3.3 C.11.2.1.1): 16-bit grey values of the stored values starting at `first`.
     pub fn voi_lut(&mut self, explanation: &str, first: u16, table: Vec<u16>) {
         let mut item = Self::new();
         // A count of 65 536 is written as 0.
@@ -87,7 +87,7 @@ impl Elements {
         self.0.put(DataElement::new(tag, VR::SQ, sequence));
     }
 
-    /// 16-bit words, such as pixels: as many as there are, where other representations end at 65 534 bytes.
+    /// 16-bit words, such as pixels, of any number; other representations are limited to 65 534 bytes.
     pub fn words(&mut self, tag: Tag, words: Vec<u16>) {
         self.0.put(DataElement::new(
             tag,
@@ -96,7 +96,7 @@ impl Elements {
         ));
     }
 
-    /// The data set as it stands, encoded.
+    /// The encoded data set.
     pub fn bytes(&self) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
         let mut bytes = Vec::new();
         let syntax = dicom_object::meta::FileMetaTableBuilder::new()
@@ -123,7 +123,7 @@ fn code_item(code: Code) -> Elements {
     item
 }
 
-/// A number in the 16 characters of a decimal string.
+/// Formats a number in the 16 characters of a decimal string.
 fn decimal(value: f64) -> String {
     let exact = value.to_string();
     if exact.len() <= 16 {

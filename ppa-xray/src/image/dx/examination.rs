@@ -16,7 +16,7 @@ const fn snomed(value: &'static str, meaning: &'static str) -> Code {
     }
 }
 
-/// What is shown, on which side, from where.
+/// Body part, side and view of a radiograph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Examination {
     /// The part of the body.
@@ -60,7 +60,7 @@ pub enum Laterality {
 pub enum View {
     /// From the front.
     AnteroPosterior,
-    /// From the front, turned, as a mortise view.
+    /// From the front with the limb rotated, such as a mortise view.
     AnteroPosteriorOblique,
     /// From behind.
     PosteroAnterior,

@@ -18,33 +18,34 @@ use crate::image::output::{OutputError, write_whole};
 use crate::image::presentation::Presentation;
 use crate::image::radiograph::Radiograph;
 
-/// Stored value of the bare field in a For Processing image; scatter can add to it.
+/// Stored value of the bare field in a For Processing image; scatter can raise a pixel above it.
 const OPEN_STORED: f64 = 40_000.0;
 
-/// Stored values per unit of log exposure after latitude reduction in a For Presentation image, and the one that is stored as 0.
+/// Stored values per unit of log exposure after latitude reduction in a For Presentation image, and the log exposure stored as 0.
 const STORED_PER_LOG: f64 = 6_000.0;
 const LOG_OF_ZERO: f64 = -1.0;
 
-/// What is not in the radiograph but belongs into its DICOM header.
+/// Data of a DICOM header that are not in the radiograph.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct DxExposure<'a> {
-    /// The exposure the radiograph was made with.
+    /// The exposure of the radiograph.
     pub projection: &'a Projection,
-    /// The tube its spectrum comes from.
+    /// The tube that emitted the spectrum.
     pub tube: &'a TubeSpec,
-    /// What is shown and how.
+    /// Anatomy, side and view.
     pub examination: Examination,
     /// Distance from the source to the table or the skin along the central ray, mm, if it is known.
     pub source_patient_mm: Option<f64>,
-    /// Exposure index that the examination aims at, if one is agreed on; it gives the deviation index.
+    /// Target exposure index of the examination, if any; it gives the deviation index.
     pub target_exposure_index: Option<f64>,
-    /// Images with the same words here share a study, such as the hash of a scan. Nothing of it can be read from the file.
+    /// Text that identifies the study, such as the hash of a scan: images with the same text share a study. The file does not
+    /// reveal it.
     pub study: &'a str,
 }
 
 impl<'a> DxExposure<'a> {
-    /// An exposure of which nothing else is known; images with the same `study` share a study.
+    /// An exposure without optional data; images with the same `study` share a study.
     pub fn new(
         projection: &'a Projection,
         tube: &'a TubeSpec,
@@ -80,30 +81,31 @@ impl<'a> DxExposure<'a> {
     }
 }
 
-/// What a DICOM image is for.
+/// Purpose of a DICOM image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DxIntent {
-    /// Detector signal over that of the bare field, linear: what a workstation would process.
+    /// Detector signal divided by that of the bare field, linear: the input of a workstation.
     Processing,
-    /// Enhanced log exposure with the window as a VOI LUT: what a reader would see.
+    /// Enhanced log exposure with the window as a VOI LUT: the image for a reader.
     Presentation(Presentation),
 }
 
 impl Radiograph {
-    /// Writes a DICOM Digital X-Ray image; the file appears whole or not at all. Needs the feature `dicom`.
+    /// Writes a DICOM Digital X-Ray image. The file is written completely or not at all. Needs the feature `dicom`.
     ///
-    /// The image is flagged as synthetic, derived and free of identity; dates and names are empty. Its UIDs follow from its
-    /// contents (2.25.‹hash›), so that the same radiograph gives the same bytes.
+    /// The image is flagged as synthetic, derived and free of identity; dates and names are empty. Its UIDs are hashes of its
+    /// contents (2.25.‹hash›), so the same radiograph gives the same bytes.
     ///
     /// * [`DxIntent::Processing`]: stored value = 40 000 × reading / bare field, clipped at 65 535 (LIN, sign +1).
-    /// * [`DxIntent::Presentation`]: stored value = 6 000 × (t + 1) with the enhanced log exposure t after latitude reduction (LOG, sign −1), the
-    ///   window as a VOI LUT, whose values are the grey of [`Radiograph::write_png`]. They are P-values (Presentation LUT Shape IDENTITY): equal steps
-    ///   look equal on a display that follows the Grayscale Standard Display Function (PS3.14).
+    /// * [`DxIntent::Presentation`]: stored value = 6 000 × (t + 1) with the enhanced log exposure t after latitude reduction (LOG,
+    ///   sign −1). The window is a VOI LUT, whose values are the grey of [`Radiograph::write_png`]. They are P-values (Presentation LUT
+    ///   Shape IDENTITY): equal steps look equal on a display that follows the Grayscale Standard Display Function (PS3.14).
     ///
     /// Pixels outside the collimated field are stored as the bare field and covered by a display shutter.
     ///
     /// # Errors
-    /// [`OutputError`] naming the file, a receptor that makes no sense, or an image with sides of more than 65 535 pixels, which DICOM cannot say.
+    /// [`OutputError`] naming the file, for an invalid receptor or an image with sides of more than 65 535 pixels, the limit of
+    /// DICOM.
     pub fn write_dicom(
         &self,
         path: &Path,
@@ -164,7 +166,7 @@ impl Radiograph {
             } else {
                 1.0
             };
-            // Casts saturate, so that negative and NaN become 0.
+            // Casts saturate, so negative values and NaN become 0.
             (OPEN_STORED * share).round() as u16
         };
         self.total().iter().enumerate().map(stored).collect()

@@ -1,4 +1,4 @@
-//! The modules of the Digital X-Ray image (PS3.3 A.26.3), but for unique identifiers and pixels.
+//! Modules of the Digital X-Ray image (PS3.3 A.26.3), except unique identifiers and pixels.
 
 use dicom_dictionary_std::tags;
 use nalgebra::Vector3;
@@ -80,7 +80,7 @@ impl Radiograph {
         to.text(tags::RESCALE_TYPE, "US");
         match intent {
             DxIntent::Processing => {
-                // Little signal is bone, which readers want white.
+                // Little signal is bone, which readers expect to be white.
                 to.text(tags::PHOTOMETRIC_INTERPRETATION, "MONOCHROME1");
                 to.text(tags::PRESENTATION_LUT_SHAPE, "INVERSE");
                 to.text(tags::PIXEL_INTENSITY_RELATIONSHIP, "LIN");
@@ -91,7 +91,7 @@ impl Radiograph {
                 to.text(tags::PRESENTATION_LUT_SHAPE, "IDENTITY");
                 to.text(tags::PIXEL_INTENSITY_RELATIONSHIP, "LOG");
                 to.signed(tags::PIXEL_INTENSITY_RELATIONSHIP_SIGN, -1);
-                // From the bare field on; what is stored below it is as black.
+                // Starts at the bare field; lower stored values are equally black.
                 let first = (-STORED_PER_LOG * LOG_OF_ZERO) as u16;
                 let grey = presentation.grey();
                 let shown = |stored: u16| {
@@ -151,7 +151,7 @@ impl Radiograph {
             to.integers(tags::EXPOSURE, &[mas]);
             to.integers(tags::EXPOSURE_INU_AS, &[1e3 * mas]);
         }
-        // Distances are measured along the central ray (PS3.3 C.8.11.5), which need not be square to the detector.
+        // Distances are measured along the central ray (PS3.3 C.8.11.5), which need not be perpendicular to the detector.
         let source_detector_mm = self.source_detector_mm / exposure.projection.central_ray.z;
         to.decimals(tags::DISTANCE_SOURCE_TO_DETECTOR, &[source_detector_mm]);
         if let Some(source_patient_mm) = exposure.source_patient_mm {
@@ -164,7 +164,7 @@ impl Radiograph {
         }
         match tube.filters.len() {
             0 => return to.text(tags::FILTER_TYPE, "NONE"),
-            // The terms for a single layer are shapes that it does not have.
+            // The terms for a single layer describe shapes that this one does not have.
             1 => {}
             _ => to.text(tags::FILTER_TYPE, "MULTIPLE"),
         }
@@ -217,7 +217,7 @@ impl Radiograph {
     }
 }
 
-/// Exposure index, and with a target the deviation index of IEC 62494-1; nothing for an image without index.
+/// Exposure index, and with a target the deviation index of IEC 62494-1; nothing for an image without an index.
 pub(super) fn put_exposure_index(to: &mut Elements, index: Option<f64>, target: Option<f64>) {
     let Some(index) = index else {
         return;
@@ -313,7 +313,7 @@ fn filter_term(material: &Material) -> String {
     }
 }
 
-/// What a code string may hold: upper case, digits, spaces and underscores.
+/// Converts a name to the characters of a code string: upper case, digits, spaces and underscores.
 fn code_string(name: &str) -> String {
     let allowed = |c: char| {
         if c.is_ascii_alphanumeric() {

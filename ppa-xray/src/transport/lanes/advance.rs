@@ -1,18 +1,18 @@
-//! One step of every flight: to a tentative collision, or to the end of the cube over which its majorant holds.
+//! One step of every flight: to a tentative collision, or to the end of the cube over which its majorant is valid.
 
 use crate::isa::Kernel;
 use crate::transport::lanes::flights::{Box32, Each, Flights, LANES};
 use crate::vector_math::{floor, greatest, least};
 
-/// Where the flights stand in the lattice of blocks.
+/// Positions of the flights in the lattice of blocks.
 #[derive(Debug)]
 pub(super) struct Blocks {
     /// Block coordinates.
     at: [Each<f32>; 3],
     pub index: Each<u32>,
-    /// Blocks around it over which `bound` holds.
+    /// Number of blocks around it over which `bound` is valid.
     pub reach: Each<f32>,
-    /// mm⁻¹.
+    /// Attenuation bound, mm⁻¹.
     pub bound: Each<f32>,
 }
 
@@ -27,7 +27,7 @@ impl Blocks {
     }
 }
 
-/// What the next step of each flight leads to.
+/// Result of the next step of each flight.
 #[derive(Debug)]
 pub(super) struct Steps {
     /// Voxel coordinates of a tentative collision.
@@ -39,9 +39,9 @@ pub(super) struct Steps {
 impl Steps {
     /// The flight continues in another block.
     pub const ON: u32 = 0;
-    /// A tentative collision, to be accepted or not.
+    /// A tentative collision, still to be accepted or rejected.
     pub const TENTATIVE: u32 = 1;
-    /// The box, or the space before the detector plane, is left.
+    /// The flight leaves the box or reaches the detector plane.
     pub const OUT: u32 = 2;
 
     pub fn new() -> Self {
@@ -78,13 +78,13 @@ fn locate(space: &Box32, flights: &Flights, blocks: &mut Blocks, count: usize) {
         blocks.at[0][i] = x;
         blocks.at[1][i] = y;
         blocks.at[2][i] = z;
-        // Idle lanes hold anything.
+        // Idle lanes may hold any values.
         let row = y_index.wrapping_add(ny.wrapping_mul(z_index));
         blocks.index[i] = x_index.wrapping_add(nx.wrapping_mul(row));
     }
 }
 
-/// Takes each flight to its next tentative collision, or to the end of the cube over which its bound holds.
+/// Moves each flight to its next tentative collision, or to the end of the cube over which its bound is valid.
 pub(super) struct Advance<'a> {
     pub space: &'a Box32,
     pub flights: &'a mut Flights,
@@ -114,7 +114,7 @@ fn advance(space: &Box32, flights: &mut Flights, blocks: &Blocks, steps: &mut St
             let at = blocks.at[axis][i];
             low[axis] = greatest((at - reach) * space.edge, 0.0);
             high[axis] = least((at + reach + 1.0) * space.edge, size[axis]);
-            // Leaving backwards means the first number below the wall.
+            // Leaving backwards ends at the first number below the wall.
             let below = low[axis] - (low[axis] * 2.5e-7 + 1e-6);
             let forward = flights.slope[axis][i] > 0.0;
             wall[axis] = if forward { high[axis] } else { below };
@@ -130,7 +130,7 @@ fn advance(space: &Box32, flights: &mut Flights, blocks: &Blocks, steps: &mut St
         let mut inside = true;
         for axis in 0..3 {
             let moved = flights.position[axis][i] + flights.slope[axis][i] * distance_mm;
-            // Rounding must neither leave the cube early, not even onto its far wall, nor fail to leave it.
+            // Rounding must not make the flight leave the cube early, not even onto its far wall, or fail to leave it.
             let kept = least(greatest(moved, low[axis]), high[axis] * (1.0 - 1.2e-7));
             let place = if exit[axis] <= distance_mm {
                 wall[axis]

@@ -1,4 +1,4 @@
-//! Outcome of tentative collisions: none, absorption with or without a K x-ray, or scattering.
+//! Outcome of tentative collisions: rejection, absorption with or without a K x-ray, or scattering.
 
 use crate::isa::prefetch;
 use crate::phantom::interpolation::Interpolation;
@@ -11,7 +11,7 @@ use crate::transport::score::Score;
 use crate::transport::tally::Category;
 use crate::transport::voxel_codes::VoxelCode;
 
-/// Where a tentative collision takes place.
+/// Site of a tentative collision.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Site {
     lane: u8,
@@ -26,24 +26,24 @@ impl Site {
     }
 }
 
-/// One of the eight voxels with centres around a position, each with the probability of its trilinear weight, counted from the
-/// corner of the rim: that at the position plus an offset that is uniform over one voxel.
+/// Samples one of the eight voxels with centres around a position, with the probability of its trilinear weight: the voxel at the
+/// position plus an offset that is uniform over one voxel. Indices start at the corner of the rim.
 ///
-/// The offsets take the low bytes of random `words` whose other uses drop them, in steps of 2⁻⁸.
+/// The offsets are the low bytes of random `words` whose other uses discard them, in steps of 2⁻⁸.
 #[inline(always)]
 fn neighbour(position: [f32; 3], voxel: [usize; 3], words: [u32; 4]) -> [usize; 3] {
     let [x, _, y, z] = words;
     let words = [x, y, z];
     std::array::from_fn(|axis| {
         let offset = ((words[axis] & 0xFF) as f32 + 0.5) * (1.0 / 256.0);
-        // In [0, 2): below a half the voxel before, from one and a half on the next.
+        // In [0, 2): below ½ the previous voxel, from 1½ on the next one.
         let from_before = position[axis] - voxel[axis] as f32 + offset;
         voxel[axis] + usize::from(from_before >= 0.5) + usize::from(from_before >= 1.5)
     })
 }
 
 impl Lanes<'_, '_> {
-    /// Accepts or rejects tentative collisions and carries out the accepted ones.
+    /// Accepts or rejects tentative collisions and processes the accepted ones.
     pub(super) fn collide(
         &mut self,
         tentative: &Picked,
@@ -60,7 +60,7 @@ impl Lanes<'_, '_> {
         let interpolation = tables.phantom.interpolation();
         for (i, lane) in tentative.iter().enumerate() {
             let voxel = each(&steps.voxel, lane).map(|index| index as usize);
-            // Counted from the corner of the rim.
+            // Indices from the corner of the rim.
             let at = match interpolation {
                 Interpolation::Nearest => voxel.map(|index| index + 1),
                 Interpolation::Trilinear => {
@@ -129,7 +129,7 @@ impl Lanes<'_, '_> {
         }
     }
 
-    /// A K x-ray takes the place of the photon that was absorbed; what is left of that one's energy, keV.
+    /// Replaces the absorbed photon by a K x-ray; returns the rest of the absorbed energy, keV.
     #[cold]
     fn emit_k_ray(&mut self, lane: usize, line_kev: f64) -> f64 {
         let photon = &mut self.photons[lane];

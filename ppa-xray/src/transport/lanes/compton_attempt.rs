@@ -12,10 +12,10 @@ pub(super) struct Attempts {
     pub energy_kev: Each<f32>,
     /// sin²(θ/2).
     pub sin2_half_theta: Each<f32>,
-    /// Of the struck electron, as `momentum`.
+    /// Binding energy of the struck electron; `momentum` is also that of the electron.
     pub binding_kev: Each<f32>,
     pub momentum: Each<f32>,
-    /// Energy of the scattered photon, or what [`BoundElectron::outcome`] says instead.
+    /// Energy of the scattered photon, or a special value of [`BoundElectron::outcome`].
     pub scattered_kev: Each<f32>,
 }
 
@@ -31,7 +31,7 @@ impl Attempts {
     }
 }
 
-/// Finds the energies of scattered photons.
+/// Computes the energies of scattered photons.
 pub(super) struct Attempt<'a> {
     pub attempts: &'a mut Attempts,
     /// Random words.
@@ -60,7 +60,7 @@ fn attempt(attempts: &mut Attempts, momentum: &Each<u32>, sign_word: &Each<u32>,
             momentum: attempts.momentum[i],
         };
         let (energy_kev, sin2_half_theta) = (attempts.energy_kev[i], attempts.sin2_half_theta[i]);
-        // In the middle of steps of 2⁻²³: neither 0 nor 1, whose momentum would be infinite.
+        // Midpoints of steps of 2⁻²³: neither 0 nor 1, whose momentum would be infinite.
         let u = ((momentum[i] >> 9) as i32 as f32 + 0.5) * (1.0 / 8_388_608.0);
         let scattered = electron.outcome(energy_kev, sin2_half_theta, u, unit(sign_word[i]));
         attempts.scattered_kev[i] = least(scattered, energy_kev);

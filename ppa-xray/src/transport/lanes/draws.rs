@@ -1,4 +1,4 @@
-//! Random numbers of many histories, and the optical depths made of them.
+//! Random numbers of many histories, and the optical depths sampled from them.
 
 use ppa_core::random::philox;
 
@@ -33,7 +33,7 @@ impl Draws {
 /// Uniform in (0, 1]: fine near zero, so that free paths reach 22 mean free paths.
 #[inline(always)]
 fn open_unit(word: u32) -> f32 {
-    // Halves are exact in `f32`, and signed conversions are one instruction.
+    // Halves are exact in `f32`, and signed conversions take one instruction.
     let half = (word >> 1) as i32 as f32;
     (half + 0.25) * (1.0 / 2_147_483_648.0)
 }
@@ -69,7 +69,7 @@ impl Kernel for Draw<'_> {
     }
 }
 
-/// Optical depths of mean 1 from one random word each.
+/// Samples optical depths of mean 1 from one random word each.
 pub(super) struct Depths<'a> {
     pub word: &'a Each<u32>,
     pub depth: &'a mut Each<f32>,

@@ -1,4 +1,4 @@
-//! From a place and a direction to a flight in the box: slopes, the way to the detector plane, the first wall.
+//! Converts positions and directions to flights in the box: slopes, the distance to the detector plane, the first wall.
 
 #![expect(
     clippy::needless_range_loop,
@@ -9,7 +9,7 @@ use crate::isa::Kernel;
 use crate::transport::lanes::flights::{Box32, Each, Flights, LANES, each};
 use crate::vector_math::{greatest, least};
 
-/// Finds slopes and the way to the detector plane from positions and directions.
+/// Computes slopes and the distance to the detector plane from positions and directions.
 pub(super) struct Aim<'a> {
     pub space: &'a Box32,
     pub flights: &'a mut Flights,
@@ -32,7 +32,7 @@ fn aim(space: &Box32, flights: &mut Flights, count: usize) {
         let [x, y, z] = each(&flights.position, i);
         for axis in 0..3 {
             let slope = space.cells(axis, direction);
-            // A flight along a wall still has a reciprocal.
+            // A flight parallel to a wall still needs a finite reciprocal.
             let guarded = if slope.abs() < 1e-12 { 1e-12 } else { slope };
             flights.slope[axis][i] = guarded;
             flights.inverse[axis][i] = 1.0 / guarded;
@@ -48,7 +48,7 @@ fn aim(space: &Box32, flights: &mut Flights, count: usize) {
     }
 }
 
-/// Turns positions from mm in the device frame into cells.
+/// Converts positions from mm in the device frame to cells.
 pub(super) struct Place<'a> {
     pub space: &'a Box32,
     pub flights: &'a mut Flights,
@@ -68,7 +68,7 @@ impl Kernel for Place<'_> {
     }
 }
 
-/// Takes photons from the source to the box.
+/// Moves photons from the source to the box.
 pub(super) struct Enter<'a> {
     pub space: &'a Box32,
     pub flights: &'a mut Flights,
@@ -99,7 +99,7 @@ fn enter(space: &Box32, flights: &mut Flights, meets: &mut Each<u32>, count: usi
         let distance_mm = if met { first } else { 0.0 };
         for axis in 0..3 {
             let at = flights.position[axis][i] + flights.slope[axis][i] * distance_mm;
-            // The largest number below the far wall still lies in the box.
+            // The largest number below the far wall is still in the box.
             let within = least(greatest(at, 0.0), size[axis] * (1.0 - 1.2e-7));
             flights.position[axis][i] = if met { within } else { at };
         }

@@ -1,4 +1,4 @@
-//! Photons that leave the box, on to the detector plane or away.
+//! Photons that leave the box and reach the detector plane or escape.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,7 @@ use crate::transport::lanes::{Lanes, Photon};
 use crate::transport::score::{Arrival, Score};
 
 impl Lanes<'_, '_> {
-    /// The flight in `lane` has left the box or met the detector plane.
+    /// Ends the flight in `lane`, which has left the box or met the detector plane.
     pub(super) fn leave(&mut self, lane: usize, score: &mut impl Score) {
         let position = each(&self.flights.position, lane);
         let direction = each(&self.flights.direction, lane);
@@ -20,7 +20,7 @@ impl Lanes<'_, '_> {
         );
     }
 
-    /// Brings a photon from the edge of the box to the detector plane, or lets it go.
+    /// Moves a photon from the edge of the box to the detector plane, or lets it escape.
     #[inline(always)]
     pub(super) fn exit(
         &self,

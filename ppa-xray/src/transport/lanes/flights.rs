@@ -1,11 +1,11 @@
-//! Straight flights of many photons, and the box they fly through, as arrays that loops turn into vector instructions.
+//! Straight flights of many photons and the box around them, as arrays whose loops compile to vector instructions.
 //!
 //! A photon's position is in cells from the corner of the voxel box, its path length in mm.
 
-/// Photons under way at once.
+/// Number of photons followed at once.
 pub(crate) const LANES: usize = 64;
 
-/// One number of every photon.
+/// One value per photon.
 pub(super) type Each<T> = [T; LANES];
 
 /// Straight flights of many photons, one array per quantity.
@@ -21,11 +21,11 @@ pub(super) struct Flights {
     pub inverse: [Each<f32>; 3],
     /// Optical depth left to the next tentative collision.
     pub depth: Each<f32>,
-    /// Way to the detector plane, mm; infinite for photons that fly away from it.
+    /// Distance to the detector plane, mm; infinite for photons that fly away from it.
     pub to_plane_mm: Each<f32>,
 }
 
-/// One of [`Flights`].
+/// A single flight of [`Flights`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flight {
     position: [f32; 3],
@@ -72,7 +72,7 @@ impl Flights {
         self.to_plane_mm[photon] = flight.to_plane_mm;
     }
 
-    /// Sends photon `to` where photon `from` of another bundle flies, from where it stands.
+    /// Gives photon `to` the direction of photon `from` of another bundle, at its own position.
     #[inline(always)]
     pub fn turn(&mut self, to: usize, other: &Self, from: usize) {
         for axis in 0..3 {
@@ -84,12 +84,12 @@ impl Flights {
     }
 }
 
-/// The voxel box seen from the device, in `f32`.
+/// The voxel box as seen from the device, in `f32`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Box32 {
-    /// Cells from the device frame: three rows, then the offset.
+    /// Transform from the device frame to cells: three rows, then the offset.
     pub cell_from_device: [[f32; 4]; 3],
-    /// Height above the source over cells: device z = row · cell + offset.
+    /// Height above the source as a function of cells: device z = row · cell + offset.
     pub device_z: [f32; 4],
     pub source_detector_mm: f32,
     /// Cells along each axis.
@@ -100,7 +100,7 @@ pub(super) struct Box32 {
 }
 
 impl Box32 {
-    /// Cells along `axis` that a vector of the device frame spans, mm.
+    /// Component along `axis`, in cells, of a vector of the device frame, mm.
     #[inline(always)]
     pub fn cells(&self, axis: usize, [x, y, z]: [f32; 3]) -> f32 {
         let [a, b, c, _] = self.cell_from_device[axis];

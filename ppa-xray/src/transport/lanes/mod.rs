@@ -1,8 +1,8 @@
-//! Many histories at once: the arithmetic of all flights is vector code, tables and decisions are taken photon by photon.
+//! Follows many histories at once: the arithmetic of all flights is vector code, tables and decisions are handled photon by photon.
 //!
-//! Every round takes each flight one step: to the wall of the cube over which its bound holds, or to a tentative collision.
-//! A photon whose history ends makes room for the next one. The random numbers of a history depend on nothing but the
-//! seed and its index, so the histories that run alongside it change nothing.
+//! Every round advances each flight by one step: to the wall of the cube over which its bound is valid, or to a tentative collision.
+//! A photon whose history ends is replaced by the next one. The random numbers of a history depend only on the
+//! seed and its index, so histories do not affect each other.
 
 mod advance;
 mod collisions;
@@ -38,7 +38,7 @@ use crate::transport::tracking::Transport;
 
 pub(crate) use flights::LANES;
 
-/// What a photon is, besides where it flies.
+/// Properties of a photon other than its flight.
 #[derive(Debug, Clone, Copy)]
 struct Photon {
     history: u64,
@@ -53,7 +53,7 @@ struct Photon {
     slot: u8,
 }
 
-/// The histories of a range, under way.
+/// Running histories of a range.
 struct Lanes<'a, 'p> {
     transport: &'a Transport<'p>,
     space: Box32,
@@ -64,22 +64,22 @@ struct Lanes<'a, 'p> {
     waiting: Waiting,
     flights: Flights,
     photons: Each<Photon>,
-    /// Lanes in use; they come first.
+    /// Number of lanes in use; they come first.
     count: usize,
     draws: Draws,
     scattering: Scattering,
 }
 
 impl Transport<'_> {
-    /// Follows the `histories` of a seed and reports to `score` what they leave; slots are below [`LANES`].
+    /// Follows the `histories` of a seed and reports their events to `score`; slots are below [`LANES`].
     ///
-    /// Each history is the same whatever runs beside it: any split of a range leaves the same events, in another order.
+    /// Each history is independent of the others followed at the same time: any split of a range gives the same events, in another order.
     pub fn follow(&self, seed: u64, histories: Range<u64>, score: &mut impl Score) {
         follow(self, seed, histories, score);
     }
 }
 
-/// Follows `histories` of `seed` and reports to `score` what they leave; slots are below [`LANES`].
+/// Follows `histories` of `seed` and reports their events to `score`; slots are below [`LANES`].
 fn follow(transport: &Transport, seed: u64, histories: Range<u64>, score: &mut impl Score) {
     Lanes::new(transport, Isa::widest(), seed, histories).run(score);
 }
@@ -156,9 +156,9 @@ impl<'a, 'p> Lanes<'a, 'p> {
         }
     }
 
-    /// One step of every flight.
+    /// Advances every flight by one step.
     fn step(&mut self, blocks: &mut Blocks, steps: &mut Steps) {
-        // Whole vectors: lanes beyond the last photon hold old, harmless numbers.
+        // Round up to whole vectors: lanes beyond the last photon hold old, harmless numbers.
         let count = self.count.next_multiple_of(16);
         self.isa.run(Locate {
             space: &self.space,
@@ -202,7 +202,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
         });
     }
 
-    /// Generator of a history whose next block is number `step`.
+    /// Returns the generator of a history whose next block is number `step`.
     fn generator(&self, photon: &Photon) -> Philox {
         Philox::at(
             self.seed,

@@ -4,7 +4,7 @@ use crate::isa::Kernel;
 use crate::transport::lanes::draws::unit;
 use crate::transport::lanes::flights::{Each, Flights, LANES};
 
-/// Sends photons from the origin towards the field, evenly in solid angle.
+/// Emits photons from the origin towards the field, uniformly in solid angle.
 pub(super) struct PlainBeam<'a> {
     /// Lowest x and y of the field and its sides, mm.
     pub low_mm: [f32; 2],
@@ -13,7 +13,7 @@ pub(super) struct PlainBeam<'a> {
     /// Random words.
     pub words: &'a [Each<u32>; 4],
     pub flights: &'a mut Flights,
-    /// Whether the photon is kept: points even on the field are kept with probability cos³θ.
+    /// Whether the photon is kept: points uniform over the field are kept with probability cos³θ.
     pub kept: &'a mut Each<u32>,
     pub count: usize,
 }
@@ -49,8 +49,8 @@ mod tests {
     use crate::transport::lanes::draws::{Draw, Draws};
     use crate::transport::stream::Stream;
 
-    /// Of photons even on a wide field, those kept are in proportion to the solid angle of the whole field and of a quarter
-    /// of it about the centre, the axis being off it: 4.5 standard errors, 7e-6 each.
+    /// The number of kept photons, from points uniform over a wide field, is proportional to solid angle, for the field and for a quarter
+    /// of it about the centre, with the axis off centre: 4.5 standard errors, 7e-6 each.
     #[test]
     fn photons_kept_are_even_in_solid_angle() {
         let field = Field::centred([100.0, 0.0], [1_000.0, 800.0]);

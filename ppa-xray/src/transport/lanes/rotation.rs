@@ -53,7 +53,7 @@ fn rotate(angles: &ScatterAngles, direction: &mut [Each<f32>; 3], count: usize) 
             sign * b * u + (sign + y * y * a) * v + y * cos_theta,
             z * cos_theta - sign * x * u - y * v,
         ];
-        // One Newton step back to length 1.
+        // One Newton step to restore unit length.
         let square = new[0] * new[0] + new[1] * new[1] + new[2] * new[2];
         let length = 1.5 - 0.5 * square;
         for axis in 0..3 {

@@ -1,4 +1,4 @@
-//! Photons that scatter, and the x-rays of K shells: new directions and energies.
+//! Scattering of photons and emission of K x-rays: new directions and energies.
 
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::lanes::collisions::Site;
@@ -12,7 +12,7 @@ use crate::transport::lanes::{Lanes, Photon};
 use crate::transport::score::Score;
 use crate::transport::tally::Category;
 
-/// Room for the photons that scatter in one round, side by side; behind them old, harmless numbers.
+/// Buffers for the photons that scatter in one round, stored contiguously; old, harmless numbers follow them.
 pub(super) struct Scattering {
     flights: Flights,
     pub angles: ScatterAngles,
@@ -40,8 +40,8 @@ impl Photon {
 }
 
 impl Lanes<'_, '_> {
-    /// Scatters photons: the first `compton` of them off electrons, then `rayleigh` off whole atoms. The others are K x-rays,
-    /// which leave in any direction alike.
+    /// Scatters photons: the first `compton` of them off electrons, then `rayleigh` off atoms. The others are K x-rays,
+    /// which are emitted isotropically.
     pub(super) fn scatter(
         &mut self,
         scattered: &[Site],
@@ -70,7 +70,7 @@ impl Lanes<'_, '_> {
             photon.energy_kev = scattered_kev;
             photon.scatter(Category::Compton);
             if f64::from(scattered_kev) < CUTOFF_KEV {
-                // What is left of the photon stays here too.
+                // The remaining energy of the photon is deposited here too.
                 score.deposit(slot, site.voxel, before_kev);
                 score.finish(slot);
                 ended.push_if(site.lane(), true);
@@ -117,7 +117,7 @@ impl Lanes<'_, '_> {
         }
     }
 
-    /// One attempt at each Compton scattering, if the tables of its material let attempts be made together.
+    /// Makes one attempt at each Compton scattering, if the tables of the material allow vectorised attempts.
     fn attempt_compton(&mut self, sites: &[Site]) {
         let attempts = &mut self.scattering.attempts;
         for (n, site) in sites.iter().enumerate() {
@@ -131,7 +131,7 @@ impl Lanes<'_, '_> {
                     attempts.binding_kev[n] = electron.binding_kev;
                     attempts.momentum[n] = electron.momentum;
                 }
-                // No photon without energy frees an electron.
+                // A photon without energy cannot free an electron.
                 None => attempts.energy_kev[n] = 0.0,
             }
         }
@@ -143,7 +143,7 @@ impl Lanes<'_, '_> {
         });
     }
 
-    /// sin²(θ/2) and the energy in keV after Compton scattering; photons whose attempts all failed are sampled one by one.
+    /// Samples sin²(θ/2) and the energy in keV after Compton scattering; photons whose attempts all failed are sampled one by one.
     #[inline(always)]
     fn compton(&mut self, site: &Site, n: usize) -> (f32, f32) {
         let sin2_half_theta = self.scattering.attempts.sin2_half_theta[n];

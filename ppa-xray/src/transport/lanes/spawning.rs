@@ -1,4 +1,4 @@
-//! Photons from the source into the lanes that ended histories leave.
+//! Puts photons from the source into the lanes of ended histories.
 
 use ppa_core::random::Philox;
 
@@ -13,7 +13,7 @@ use crate::transport::score::Score;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Category;
 
-/// Photons that have left the source and wait for a lane.
+/// Photons that have left the source and wait for a free lane.
 pub(super) struct Waiting {
     pub flights: Flights,
     pub photons: Each<Photon>,
@@ -50,7 +50,7 @@ impl Lanes<'_, '_> {
         }
     }
 
-    /// Puts the next photon that meets the box into `lane`; false once the range is used up.
+    /// Puts the next photon that meets the box into `lane`; returns false once the range is used up.
     pub(super) fn spawn(&mut self, lane: usize, score: &mut impl Score) -> bool {
         let slot = self.photons[lane].slot;
         loop {
@@ -81,7 +81,7 @@ impl Lanes<'_, '_> {
         }
     }
 
-    /// Emits the next photons of the range; false once it is used up.
+    /// Emits the next photons of the range; returns false once it is used up.
     fn emit(&mut self) -> bool {
         let first = self.remaining.start;
         let count = (self.remaining.end - first).min(LANES as u64) as usize;
@@ -128,7 +128,7 @@ impl Lanes<'_, '_> {
         true
     }
 
-    /// Directions and energies of waiting photons from the first random block of each.
+    /// Samples directions and energies of waiting photons from the first random block of each.
     fn leave_source(&mut self, first: u64, count: usize) {
         let transport = self.transport;
         let mut kept = [0; LANES];

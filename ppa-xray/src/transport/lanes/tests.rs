@@ -1,4 +1,4 @@
-//! Each history is independent of the other lanes, and balances its energy.
+//! Each history is independent of the other lanes and conserves energy.
 
 mod k_x_rays;
 mod plain_histories;
@@ -47,15 +47,15 @@ fn projection() -> Projection {
     )
 }
 
-/// What one history left, as bits.
+/// Events of one history, as bits.
 type Events = Vec<[u64; 4]>;
 
-/// Keeps the events of every history.
+/// Records the events of every history.
 #[derive(Default)]
 struct Recorder {
     under_way: Vec<Events>,
     finished: Vec<Events>,
-    /// Emitted less deposited, arrived and escaped, keV.
+    /// Emitted minus deposited, arrived and escaped energy, keV.
     balance_kev: Vec<f64>,
     unbalanced: usize,
 }
@@ -137,7 +137,7 @@ fn company_and_vector_width_change_no_bit() {
     }
 }
 
-/// A tentative collision a hair before the far wall of the box: the next block is that of the last voxel still.
+/// A tentative collision just before the far wall of the box: the next block is still that of the last voxel.
 #[test]
 fn rounding_takes_no_photon_onto_the_far_wall() {
     let space = Box32 {

@@ -14,7 +14,7 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::Category;
 
-/// Photons of the energies of K lines, by the side of the foil on which they leave.
+/// Photons at the energies of K lines, by the side of the foil on which they leave.
 #[derive(Default)]
 struct KRays {
     lines: Vec<f64>,
@@ -45,8 +45,8 @@ impl Score for KRays {
 /// K x-rays that leave an iodine foil of 0.02 mm on either side, against the integral over depth and direction of
 /// emission times transmission.
 ///
-/// Scattered photons may still be absorbed, and scattered K x-rays still leave: attenuation without scattering gives the
-/// most that may leave and attenuation with it the least, 1 % apart. 4.5 standard errors beyond (7e-6 each), 2.5 %.
+/// Scattered photons may still be absorbed, and scattered K x-rays may still leave. Attenuation without scattering gives the
+/// upper limit and attenuation with it the lower one, 1 % apart. 4.5 standard errors beyond (7e-6 each), 2.5 %.
 #[test]
 fn k_x_rays_leave_a_foil_as_the_integral_says() {
     let (side_mm, thickness_mm, incident_kev) = (400.0, 0.02, 60.0);
@@ -84,7 +84,7 @@ fn k_x_rays_leave_a_foil_as_the_integral_says() {
 
     let per_mm = |cm2_g: f64| cm2_g * density / 10.0;
     let middle = |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(count);
-    // Of photons emitted at a depth, half go to either side, evenly over the cosine.
+    // Half of the photons emitted at a depth go to either side, uniformly in the cosine.
     let out = |mu: f64, way_mm: f64| -> f64 {
         let cosines = (0..400).map(|i| (-mu * way_mm / middle(i, 400)).exp());
         0.5 * cosines.sum::<f64>() / 400.0

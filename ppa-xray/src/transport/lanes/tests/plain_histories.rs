@@ -1,4 +1,4 @@
-//! The lanes against one history at a time, in double precision and without any bound.
+//! Compares the lanes with a simulation of one history at a time, in double precision and without bounds.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use ppa_core::random::Philox;
@@ -45,7 +45,7 @@ impl Score for Ends {
     }
 }
 
-/// One history in double precision: the optical depth is spent voxel by voxel, with no bound and no rejection.
+/// Follows one history in double precision: the optical depth is used up voxel by voxel, with no bound and no rejection.
 fn plain_history(transport: &Transport, rng: &mut Philox, ends: &mut Ends) {
     let Emission {
         origin_mm: mut position,
@@ -133,7 +133,7 @@ fn plain_flight(
     let mut depth = -(1.0 - rng.unit()).ln();
     let mut at = enter;
     if phantom.interpolation() == Interpolation::Trilinear {
-        // Short steps of constant density, that of their middle: the voxel is 1.7 mm wide at least.
+        // Short steps of constant density, taken at their middle; the voxel is at least 1.7 mm wide.
         const STEP_MM: f64 = 0.1;
         while at < end {
             let next = (at + STEP_MM).min(end);
@@ -174,7 +174,7 @@ fn plain_flight(
     None
 }
 
-/// The eight voxels around a place, in cells, and their trilinear weights; beyond the outermost centres nothing changes.
+/// The eight voxels around a point, in cells, and their trilinear weights; constant beyond the outermost centres.
 fn corners(cell: &Vector3<f64>, size: [usize; 3]) -> [(usize, f64); 8] {
     std::array::from_fn(|corner| {
         let (mut voxel, mut weight, mut stride) = (0, 1.0, 1);
@@ -196,13 +196,13 @@ fn corners(cell: &Vector3<f64>, size: [usize; 3]) -> [(usize, f64); 8] {
     })
 }
 
-/// Bounds, rejection, single precision and the order of random numbers leave every mean where it is.
+/// Bounds, rejection, single precision and the order of random numbers do not change any mean.
 #[test]
 fn lanes_and_plain_histories_agree() {
     assert_agreement(Interpolation::Nearest);
 }
 
-/// The same between centres of voxels, where one neighbour after the other stands for all eight.
+/// The same between centres of voxels, where a randomly chosen neighbour represents all eight.
 #[test]
 fn lanes_and_plain_histories_agree_between_centres() {
     assert_agreement(Interpolation::Trilinear);
