@@ -1,4 +1,4 @@
-//! The user's waiting time from end to end: a case from a scan, and a pose of a dataset.
+//! End-to-end waiting time of a user: preparing a case from a scan, and generating a pose of a dataset.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Writes what `benches/peers` measures other programs on: `peer_inputs FOLDER`.
+//! Writes the inputs on which `benches/peers` measures other programs: `peer_inputs FOLDER`.
 //!
 //! `leg.nii` is the volume of `cargo bench -p ppa-mesh`, `room.ply` the cloud of `cargo bench -p ppa-scene`, `tube.ply` the mesh of
 //! `cargo bench -p ppa-depth`.

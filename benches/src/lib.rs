@@ -1,4 +1,4 @@
-//! What the benches of the crates measure in. Benches across crates live in the `benches` folder beside this file.
+//! Measurement shared by the benches of the crates. Benches across crates are in the `benches` folder next to this file.
 
 mod processor_time;
 

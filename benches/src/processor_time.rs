@@ -1,4 +1,4 @@
-//! Processor time as criterion measures it.
+//! Processor time as a measurement of criterion.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! A DICOM file of any kind: its elements, its geometry, its pixels.
+//! A DICOM file of any kind: elements, geometry and pixels.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! What readers hand in, and the key of their pictures.
+//! Grades returned by readers, and the key of their pictures.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! The contents of one argument: a shard, a series.
+//! Values of single arguments: a shard, a series.
 
 #![no_main]
 

@@ -1,6 +1,6 @@
-//! The smallest DICOM file around a compressed frame.
+//! A minimal DICOM file around a compressed frame.
 
-/// A CT slice of the transfer syntax `syntax`: `size` columns and rows, 8 or 16 bits by the parity of `bits`, one fragment.
+/// Returns a CT slice with transfer syntax `syntax`: `size` columns and rows, 8 or 16 bits by the parity of `bits`, one fragment.
 pub fn dicom_file(syntax: &str, size: [u8; 2], bits: u8, fragment: &[u8]) -> Vec<u8> {
     let [columns, rows] = size.map(|n| u16::from(n.max(1)).to_le_bytes());
     let bits = if bits % 2 == 0 { 16_u16 } else { 8 };

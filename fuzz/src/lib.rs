@@ -1,4 +1,4 @@
-//! What the fuzz targets share: bytes become the file that a reader of ppa opens.
+//! Shared code of the fuzz targets: turns bytes into a file for a reader of ppa.
 
 mod dicom;
 
@@ -14,7 +14,7 @@ use ppa_dataset::layout::{LimbId, Side};
 use ppa_dataset::published::Published;
 use ppa_dataset::{Manifest, Split};
 
-/// One folder for each process: a file is written again and again.
+/// One folder per process; its files are overwritten in every run.
 static FOLDER: LazyLock<PathBuf> =
     LazyLock::new(|| tempfile::tempdir().expect("a folder for files").keep());
 
@@ -25,7 +25,7 @@ pub fn with_file(name: &str, bytes: &[u8], read: impl FnOnce(&Path)) {
     read(&path);
 }
 
-/// Whatever can be read is.
+/// Options that read everything that can be read.
 pub fn forced() -> ReadOptions {
     ReadOptions {
         series: None,
@@ -34,7 +34,7 @@ pub fn forced() -> ReadOptions {
     }
 }
 
-/// Reads a DICOM file with one compressed frame: two bytes of columns and rows, one of its bits, then the frame.
+/// Reads a DICOM file with one compressed frame. `data` is a byte each of columns, rows and bits, then the frame.
 pub fn read_frame(syntax: &str, data: &[u8]) {
     let [columns, rows, bits, frame @ ..] = data else {
         return;
@@ -59,7 +59,7 @@ pub fn read_grades(data: &[u8]) {
     });
 }
 
-/// Reads the lists of a dataset, of which one holds `data`.
+/// Reads the lists of a dataset, one of which contains `data`.
 pub fn read_dataset(kind: u8, data: &[u8]) {
     let limb = LimbId {
         patient: 0,

@@ -1,6 +1,6 @@
 #!/bin/sh
-# What moved cameras and sensor errors cost: networks trained with the source (`ppa experiment 2a`), tested without finetuning on the feet
-# in the place of the preparations, with and without both. domain_gap.sh FOLDER, that of make_data.sh with the trainings in FOLDER/runs.
+# Effect of moved cameras and sensor errors: networks trained with the source (`ppa experiment 2a`), tested without finetuning on the feet
+# of the simulated preparations, with and without both. domain_gap.sh FOLDER, that of make_data.sh with the training runs in FOLDER/runs.
 set -eu
 cd "$1"
 

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes the scans and cases of plan.toml beside this script: seventeen phantom feet.
-# Needs the program ppa on the PATH, about 6 s of processor time and 7 MB of disk for each foot.
+# Makes the scans and cases of the plan.toml next to this script: seventeen phantom feet. Needs the program ppa on the PATH,
+# about 6 s of processor time and 7 MB of disk for each foot.
 set -eu
 cd "$(dirname "$0")"
 for i in 01 02 03 04 05 06 07 08 09 10 11 12 13 14 15 16 17; do

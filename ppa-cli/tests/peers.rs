@@ -1,4 +1,4 @@
-//! Datasets as programs read them that others wrote.
+//! Datasets read by third-party programs.
 //!
 //! With a Python that has the packages of the test, PPA_PYTHON or else `python3`:
 //! `cargo test -p ppa-cli --features peers --test peers`. Those of the first test are packages of Debian and Ubuntu
@@ -19,7 +19,7 @@ fn ppa(folder: &Path, arguments: &str) {
     report(out.unwrap());
 }
 
-/// Runs a script in Python with `folder` as current folder; what it prints.
+/// Runs a Python script with `folder` as the current folder and returns its output.
 fn python(folder: &Path, script: &str) -> String {
     let program = std::env::var_os("PPA_PYTHON").unwrap_or_else(|| "python3".into());
     let mut command = Command::new(program);
@@ -33,7 +33,7 @@ fn report(out: std::process::Output) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-/// A folder with the dataset `data` of one limb in three poses and two body shapes, labelled, split and exported, and with the
+/// A folder with the labelled, split and exported dataset `data` of one limb in three poses and two body shapes, and the
 /// radiograph `x.png`, `x.dcm`.
 fn exported() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
@@ -70,7 +70,7 @@ fn exported() -> &'static Path {
     folder.path()
 }
 
-/// Every row and every pixel: pandas, Pillow, OpenCV, pydicom.
+/// Compares every row and every pixel: pandas, Pillow, OpenCV, pydicom.
 #[test]
 fn pandas_pillow_opencv_and_pydicom_read_tables_and_images() {
     let here = exported();
@@ -130,7 +130,7 @@ print(json.dumps(sums))
     }
 }
 
-/// The validators and readers of the formats themselves.
+/// Uses the validators and readers of the formats themselves.
 #[test]
 fn pyarrow_mlcroissant_and_others_read_the_exports() {
     let script = r#"

@@ -1,11 +1,11 @@
-//! Materials, spectra and their look-ups.
+//! Materials, spectra and look-ups in them.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ppa_xray::{ComptonModel, Material, MaterialTables, ScatterDensities, Spectrum, TubeSpec};
 
-/// Look-ups per iteration, at energies that jump about as those of histories do.
+/// Look-ups per iteration, at energies in irregular order as in a simulation.
 const LOOKUPS: u64 = 1000;
 
 fn tube() -> TubeSpec {
@@ -16,12 +16,12 @@ fn tube() -> TubeSpec {
     TubeSpec::new(62.0, 11.0, filters)
 }
 
-/// Numbers from 0 to 1 that fill the interval evenly and jump about.
+/// Evenly distributed numbers from 0 to 1 in irregular order (golden-ratio sequence).
 fn golden(i: u64) -> f64 {
     (i as f64 * 0.618_033_988_749_895).fract()
 }
 
-/// Energies of the spectrum in an order without order.
+/// Energies sampled from the spectrum, in irregular order.
 fn energies_kev(spectrum: &Spectrum) -> Vec<f64> {
     (0..LOOKUPS).map(|i| spectrum.sample(golden(i))).collect()
 }
@@ -60,7 +60,7 @@ fn look_ups(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Scatterings per iteration, at the energies of the spectrum, with uniforms of a generator that costs about 1 ns.
+/// Scattering events per iteration, at energies of the spectrum; the random number generator costs about 1 ns per number.
 fn scattering(criterion: &mut Criterion) {
     let spectrum = Spectrum::tungsten(&tube()).expect("inside the tube model");
     let energies = energies_kev(&spectrum);

@@ -12,8 +12,8 @@ use ppa_xray::{
 };
 use rayon::ThreadPoolBuilder;
 
-/// A 20 cm water cube in 2 mm voxels with a 3 cm bone cylinder, as in case a of the reference data;
-/// optionally with a titanium screw of 4 mm x 40 mm.
+/// A 20 cm water cube in 2 mm voxels with a 3 cm bone cylinder, as in case a of the reference data, optionally with a 4 mm x
+/// 40 mm titanium screw.
 fn cube(screw: bool) -> VoxelPhantom {
     let first = Point3::new(-99.0, -99.0, -99.0);
     let grid = Grid::axis_aligned([100; 3], Vector3::repeat(2.0), first).unwrap();
@@ -47,8 +47,7 @@ fn spectrum() -> Spectrum {
     Spectrum::tungsten(&tube).unwrap()
 }
 
-/// The built-in leg in 1 mm voxels, all its mixtures of tissues, or 15 cm of it around the joint; the joint is in the
-/// beam.
+/// The built-in leg in 1 mm voxels with all tissue mixtures, whole or 15 cm around the joint; the joint is in the beam.
 fn ankle(whole: bool, detector: Detector) -> (VoxelPhantom, Projection) {
     let limb = LowerLeg::p01();
     let joint = limb.truth().joint_centre;
@@ -66,7 +65,7 @@ fn ankle(whole: bool, detector: Detector) -> (VoxelPhantom, Projection) {
     (phantom, Projection::new(pose, 1_100.0, detector))
 }
 
-/// Histories per second of processor time: in one thread, and over two.
+/// Histories per second of processor time, with one thread and with two.
 fn histories(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
@@ -94,7 +93,7 @@ fn histories(criterion: &mut Criterion<ProcessorTime>) {
     }
 }
 
-/// What a projection costs before its first history.
+/// Time to prepare a projection before its first history.
 fn preparation(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
@@ -107,7 +106,7 @@ fn preparation(criterion: &mut Criterion<ProcessorTime>) {
     });
 }
 
-/// Pixels per second of processor time: the primary alone, and whole radiographs worth 2e10 histories.
+/// Pixels per second of processor time: the primary alone, and complete radiographs equivalent to 2e10 histories.
 fn images(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let mut group = criterion.benchmark_group("image");
@@ -125,8 +124,8 @@ fn images(criterion: &mut Criterion<ProcessorTime>) {
     }
 }
 
-/// Radiographs worth 2e10 histories of the whole leg in voxels of 0.5 mm, on a point source and an ideal detector and with all options of the
-/// plan in docs/book/generate.md but blur and electronic noise, which cost nothing.
+/// Radiographs of the whole leg in 0.5 mm voxels, equivalent to 2e10 histories: with a point source and an ideal detector, and with all
+/// options of the plan in docs/book/generate.md except blur and electronic noise, which cost nothing.
 fn exposures(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let volume = LowerLeg::p01().voxelise(0.5, TableTop::Absent).unwrap();

@@ -1,4 +1,4 @@
-//! A C-arm turned around a limb: one prepared phantom, many projections, each with a preview first.
+//! A C-arm rotated around a limb: one prepared phantom, many projections, each with a preview first.
 //!
 //! `cargo run --release -p ppa-xray --example c_arm_sweep -- [VIEWS] [OUT_FOLDER]`
 

@@ -1,7 +1,7 @@
-//! A CT acquisition of a water cylinder with a bone insert, and the line integrals that a reconstruction takes.
+//! A CT acquisition of a water cylinder with a bone insert, and the line integrals used for reconstruction.
 //!
-//! One detector row is printed for the first view: −ln(signal / open field) with scatter and without. Scatter makes the cylinder look
-//! less dense in its middle, which reconstructions show as cupping.
+//! Prints one detector row of the first view: −ln(signal / open field) with and without scatter. Scatter makes the middle of the
+//! cylinder look less dense, which appears as cupping in reconstructions.
 //!
 //! `cargo run --release -p ppa-xray --example ct_acquisition -- [VIEWS]`
 

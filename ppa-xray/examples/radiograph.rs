@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let phantom = VoxelPhantom::from_volume(&volume, &HuCalibration::default(), None)?;
     let spectrum = Spectrum::tungsten(&TubeSpec::new(60.0, 12.0, vec!["Al:2.5".parse()?]))?;
 
-    // Beam from anterior (ct −y) through the joint; turning the device outwards is turning the limb inwards.
+    // Beam from anterior (ct −y) through the joint; rotating the device outwards is equivalent to rotating the limb inwards.
     let from_front = Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]);
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -angle_deg.to_radians());
     let rotation = turn * Rotation3::from_matrix_unchecked(from_front);

@@ -1,4 +1,4 @@
-//! Half-value layers of a tungsten tube at several voltages, and what 10 cm of water let through.
+//! Half-value layers of a tungsten tube at several voltages, and the transmission of 10 cm of water.
 //!
 //! `cargo run -p ppa-xray --example tube_spectrum`
 

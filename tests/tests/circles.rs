@@ -1,10 +1,10 @@
-//! Dependencies run one way: no import cycle between the modules of a crate, nor between the files of a module.
+//! No import cycles between the modules of a crate, nor between the files of a module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Modules at the top of a crate, and the others that each names outside its tests.
+/// Top-level modules of a crate, and the other modules that each names outside its tests.
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -27,7 +27,7 @@ fn code(path: &Path) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The names that follow a prefix such as `crate::`, those of a braced list included.
+/// The names that follow a prefix such as `crate::`, including those of a braced list.
 fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
     let name = |text: &str| -> String {
         let is_part = |c: &char| c.is_ascii_lowercase() || c.is_ascii_digit() || *c == '_';
@@ -46,7 +46,7 @@ fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
     names
 }
 
-/// The files and folders of one folder of a crate, with the others there that each imports.
+/// The files and folders in one folder of a crate, with the others there that each imports.
 fn imports(src: &Path, folder: &Path) -> Imports {
     let inside = folder.strip_prefix(src).unwrap();
     let parents = inside.iter().map(|part| part.to_str().unwrap());
@@ -64,7 +64,7 @@ fn imports(src: &Path, folder: &Path) -> Imports {
             .to_owned();
         let code = code(&file);
         let mut names = names_after(&code, &prefix);
-        // `super` is the folder in the files that lie in it.
+        // `super` is the folder for the files in it.
         if parts.len() == 1 {
             names.extend(names_after(&code, "super::"));
         }
@@ -76,7 +76,7 @@ fn imports(src: &Path, folder: &Path) -> Imports {
     imports
 }
 
-/// Folders whose files still import each other in circles, and what joins them.
+/// Folders whose files still import each other in cycles, with the reason.
 const ONE_MODULE: [(&str, &str); 3] = [
     (
         "ppa-ct/src/dicom_series",
@@ -102,7 +102,7 @@ fn folders(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// A circle that leads from `path`'s last module back to its first.
+/// Whether the last module of `path` leads into a cycle, which is then left in `path`.
 fn circle(imports: &Imports, path: &mut Vec<String>, done: &mut BTreeSet<String>) -> bool {
     let last = path.last().unwrap().clone();
     for next in imports.get(&last).into_iter().flatten() {
@@ -137,7 +137,7 @@ fn modules_of_a_crate_import_in_one_direction() {
         let crate_root = entry.unwrap().path();
         let name = crate_root.file_name().unwrap().to_str().unwrap().to_owned();
         let src = crate_root.join("src");
-        // The demo's output, ppa-demo/, is no crate.
+        // The demo's output, ppa-demo/, is not a crate.
         if !name.starts_with("ppa-") || !src.is_dir() {
             continue;
         }

@@ -1,6 +1,6 @@
-//! What the code key of a dataset builds on: the identity of a type reveals how its crate was compiled.
+//! Basis of the code key of a dataset: the identity of a type reveals how its crate was compiled.
 //!
-//! Neither Cargo nor the compiler guarantees it, so it is tested here with crates of a few lines.
+//! Neither Cargo nor the compiler guarantees this, so it is tested here with crates of a few lines.
 
 use std::fs;
 use std::path::Path;
@@ -63,7 +63,7 @@ fn a_type_tells_versions_features_and_profile_of_its_crates() {
     assert_ne!(printed(here.path(), &[]), first, "another feature");
 }
 
-/// A crate of a registry that is compiled already, in the version of Cargo.lock: this workspace has it in the cache.
+/// A registry crate that is already compiled, in the version of Cargo.lock; this workspace has it in the cache.
 const OF_REGISTRY: &str = "colorous";
 
 fn locked_version(name: &str) -> String {
@@ -77,7 +77,7 @@ fn locked_version(name: &str) -> String {
     package["version"].as_str().unwrap().to_owned()
 }
 
-/// The identities of a type of a crate in a folder, and of one of a registry, in a program whose workspace does not contain that folder.
+/// The identities of a type of a local crate and of a registry crate, in a program whose workspace does not contain the local crate.
 fn identities_from_outside(root: &Path, arguments: &[&str]) -> [String; 2] {
     write_workspace(root, "0.1.0", "");
     let program = root.join("python");
@@ -96,7 +96,8 @@ fn identities_from_outside(root: &Path, arguments: &[&str]) -> [String; 2] {
     [lines[0].to_owned(), lines[1].to_owned()]
 }
 
-/// Why the code key asks types of registries only: the Python package is built outside the workspace, by pip in a folder with a new name.
+/// The code key uses only types of registry crates because pip builds the Python package outside the workspace, in a folder with a new
+/// name.
 #[test]
 fn only_types_of_registries_are_free_of_folders() {
     let [here, there] = [(); 2].map(|()| tempfile::tempdir().unwrap());
@@ -108,7 +109,7 @@ fn only_types_of_registries_are_free_of_folders() {
     assert_ne!(released, registry, "another profile");
 }
 
-/// Crates without influence on the bytes of an image: messages, measured time, exports, coloured previews, and how files are put into place.
+/// Crates that do not influence the bytes of an image: messages, measured time, exports, coloured previews, and moving files into place.
 const WITHOUT_INFLUENCE: [&str; 7] = [
     "atomic-write-file",
     "colorous",
@@ -148,7 +149,7 @@ fn the_code_key_knows_all_crates_that_make_images() {
     }
 }
 
-/// Without it, `cargo install` takes the newest versions instead of those in Cargo.lock.
+/// Without `--locked`, `cargo install` takes the newest versions instead of those in Cargo.lock.
 #[test]
 fn every_documented_install_line_is_locked() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -1,4 +1,4 @@
-//! A leg whose foot is cut by the field of view within the regions of interest, through the whole chain.
+//! A leg whose foot is cut by the field of view within the regions of interest, through all stages.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -18,13 +18,13 @@ const LIMB: LimbId = LimbId {
     side: layout::Side::Right,
 };
 
-/// The phantom's case with the front 20 mm of its scan, and most of the foot, cropped away (`cut`), or whole; one pose.
+/// A plan of one pose of the phantom's case, whole or (`cut`) with the front 20 mm of its scan and most of the foot cropped away.
 fn plan(folder: &Path, cut: bool) -> Plan {
     let scan = folder.join("leg.nii.gz");
     let volume = LowerLeg::p01().voxelise(2.0, TableTop::Absent).unwrap();
     ppa_ct::write_nifti(&scan, &volume).unwrap();
     let size = volume.grid().size();
-    // Patients lie on their back: y grows downwards, the toes are at the smallest y.
+    // Patients lie on their back: y points down, and the toes have the smallest y.
     let crop = VoxelBox {
         low: [0, size[1] * 11 / 20, 0],
         high: size,
@@ -141,7 +141,7 @@ fn a_foot_cut_in_the_region_needs_the_plans_consent() {
         worst = worst.max(cut.unwrap());
         let rois = invalid.rois(LIMB).unwrap();
         let roi = &rois[&LimbId::depth_name(view, 20)];
-        // Pixels differ only where the cut is invalid in one of them and a surface in the other.
+        // Pixels differ only where the cut is invalid in one image and a surface in the other.
         let differ = |pixel: &u32| none.z_mm[*pixel as usize] != wall.z_mm[*pixel as usize];
         let pixels = (0..none.z_mm.len() as u32).filter(differ);
         let (mut inside, mut all) = (0, 0);
@@ -187,7 +187,7 @@ fn a_foot_cut_in_the_region_needs_the_plans_consent() {
     assert!((stated - share.max(of_rays)).abs() <= 0.005, "{stated}");
 }
 
-/// A leg always ends where its scan does, far from the joint: that is no reason to refuse anything.
+/// A leg always ends at the end of its scan, far from the joint; this is no reason to refuse it.
 #[test]
 fn a_leg_cut_at_its_proximal_end_alone_has_no_share() {
     let folder = tempfile::tempdir().unwrap();

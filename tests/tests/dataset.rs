@@ -1,5 +1,4 @@
-//! The whole chain on a coarse phantom: geometry that must agree across crates, and a dataset
-//! that is the same however it was made.
+//! All stages on a coarse phantom: geometry that must agree across crates, and a dataset that does not depend on how it was made.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -92,7 +91,7 @@ fn replace(plan: &Plan, root: &Path, threads: usize) -> Summary {
         .unwrap()
 }
 
-/// A dataset made once by one thread, for tests that only look.
+/// A dataset made once by one thread, for tests that only read it.
 fn dataset() -> &'static Path {
     static DATASET: OnceLock<tempfile::TempDir> = OnceLock::new();
     let made = DATASET.get_or_init(|| {
@@ -103,7 +102,7 @@ fn dataset() -> &'static Path {
     made.path()
 }
 
-/// Every file below `root` but the lock, with its bytes.
+/// All files below `root` except the lock, with their bytes.
 fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -165,7 +164,7 @@ fn analog_radiographs_are_planned_made_and_verified() {
 
     let radiograph = |root: &Path| fs::read(root.join(LIMB.radiograph_png(0))).unwrap();
     assert_ne!(radiograph(&root), radiograph(dataset()));
-    // Datasets of the fast engine keep their text.
+    // Datasets of the fast engine do not mention the analog engine.
     let names_it = |root: &Path| {
         let text = fs::read_to_string(root.join("dataset.json")).unwrap();
         text.contains("analog")
@@ -228,7 +227,7 @@ fn a_run_makes_only_what_is_missing_or_damaged() {
     );
 }
 
-/// What another plan leaves in the folder is that of a run into an empty one.
+/// Replacing a plan leaves the same files as a run into an empty folder.
 #[test]
 fn images_of_an_earlier_plan_do_not_stay() {
     let (edited, fresh) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -295,8 +294,8 @@ fn no_path_of_the_scan_reaches_the_dataset() {
     }
 }
 
-/// A pixel of a depth image, taken back through camera, room and patient into the scan, lies on
-/// the phantom's analytic skin: one chain through every frame.
+/// A depth pixel, transformed through camera, room and patient into the scan, is on the phantom's analytic skin: one chain
+/// through all frames.
 #[test]
 fn depth_pixels_lie_on_the_skin_of_the_scan() {
     let phantom = LowerLeg::p01();
@@ -356,8 +355,8 @@ fn depth_pixels_lie_on_the_skin_of_the_scan() {
     }
 }
 
-/// The central beam of every radiograph passes through the phantom's true joint, and the source
-/// turns about the limb by the angle of the pose.
+/// The central beam of every radiograph passes through the phantom's true joint, and the source rotates about the limb by
+/// the angle of the pose.
 #[test]
 fn the_beam_passes_through_the_joint() {
     let truth = LowerLeg::p01().truth();
@@ -384,7 +383,7 @@ fn the_beam_passes_through_the_joint() {
     );
 }
 
-/// What `ppa prepare` wrote down leads to the same limb again, and an edited choice to another.
+/// The choices written by `ppa prepare` give the same limb again; an edited choice gives another.
 #[test]
 fn choices_of_a_case_are_carried_out() {
     let case = Case::read(&inputs().join("p01.toml")).unwrap();
@@ -415,7 +414,7 @@ fn choices_of_a_case_are_carried_out() {
     assert_eq!(found, first.landmarks);
 }
 
-/// A sensor changes depths by millimetres, with seeds in the manifest, and not the radiographs.
+/// A sensor changes depths by millimetres, with seeds in the manifest, but not the radiographs.
 #[test]
 fn a_sensor_disturbs_the_depth_images_and_nothing_else() {
     let mut plan = plan();

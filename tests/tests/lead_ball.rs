@@ -1,4 +1,4 @@
-//! A lead ball beside the ankle: radiograph and depth images show the same place.
+//! A lead ball next to the ankle: radiograph and depth images show it at the same place.
 
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3, Vector4};
 use ppa_ct::{Grid, Volume};
@@ -12,7 +12,7 @@ use ppa_xray::{Category, Detector, FastSettings, Material, VoxelPhantom, fast};
 const RADIUS_MM: f64 = 8.0;
 const VOXEL_MM: f64 = 0.5;
 
-/// How far inside the ball a point lies, mm.
+/// Depth of a point inside the ball, mm.
 fn depth_mm(p: &Point3<f64>, centre: &Point3<f64>) -> f64 {
     RADIUS_MM - (p - centre).norm()
 }
@@ -20,13 +20,12 @@ fn depth_mm(p: &Point3<f64>, centre: &Point3<f64>) -> f64 {
 fn around(centre: &Point3<f64>) -> Grid {
     let side = (2.0 * (RADIUS_MM + 2.0) / VOXEL_MM) as usize;
     let half = 0.5 * VOXEL_MM * (side - 1) as f64;
-    // The ball's centre lies on no voxel's, nor between two.
+    // The ball's centre is neither at a voxel centre nor midway between two.
     let origin = centre - Vector3::new(half + 0.11, half - 0.07, half + 0.19);
     Grid::axis_aligned([side; 3], Vector3::repeat(VOXEL_MM), origin).unwrap()
 }
 
-/// Centre of the dark spot in device x and y, mm: the mean over the pixels, weighted by what is
-/// missing.
+/// Centre of the dark spot in device x and y, mm: the mean over the pixels, weighted by the missing signal.
 fn shadow(
     centre: &Point3<f64>,
     placement: &Placement,
@@ -37,7 +36,7 @@ fn shadow(
     let grid = around(centre);
     let density = (0..grid.len()).map(|index| {
         let p = grid.centre(grid.voxel(index).map(|v| v as f64));
-        // Partial volume of a voxel that the surface cuts, taken as flat.
+        // Partial volume of a voxel cut by the surface, assumed flat.
         let share = (depth_mm(&p, centre) / VOXEL_MM + 0.5).clamp(0.0, 1.0);
         11.35 * share as f32
     });
@@ -89,8 +88,8 @@ fn sphere_centre(points: &[Point3<f64>]) -> Point3<f64> {
     Point3::from(found.xyz() + near)
 }
 
-/// Through camera, device pose, room, patient and scan on the one side, through the radiograph on
-/// the other: half a pixel of the detector apart at most.
+/// The position through camera, device pose, room, patient and scan differs from that through the radiograph by at most half
+/// a detector pixel.
 #[test]
 fn radiograph_and_depth_images_agree_on_a_lead_ball() {
     let mut plan = Plan::new(Vec::new());

@@ -1,4 +1,4 @@
-//! The documentation matches the repository: links resolve, and the sources and tests it names exist.
+//! The documentation matches the repository: links resolve, and the named sources and tests exist.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Text outside blocks of code.
+/// Text outside code blocks.
 fn prose(text: &str) -> String {
     text.split("```").step_by(2).collect()
 }
@@ -66,7 +66,7 @@ fn relative_links_and_anchors_of_the_docs_resolve() {
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
 }
 
-/// Every Rust source of the crates.
+/// All Rust sources of the crates.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

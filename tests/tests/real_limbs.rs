@@ -1,4 +1,4 @@
-//! Real scans from `../shared/data`, through the whole chain.
+//! Real scans from `../shared/data`, through all stages.
 
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ fn plan(case: &Case, folder: &Path) -> Plan {
     plan
 }
 
-/// Such poses, in a folder of its own, although the field of view cuts foot or kneecap.
+/// A dataset of these poses in its own folder, although the field of view cuts foot or kneecap.
 fn dataset(case: &Case) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut plan = plan(case, folder.path());
@@ -62,8 +62,8 @@ fn dataset(case: &Case) -> tempfile::TempDir {
     folder
 }
 
-/// The left calf is mostly outside the image, so that the right one is taken for either side, without the
-/// other; for the left this is a finding.
+/// The left calf is mostly outside the image, so the right one is taken for either side, without the other; for the left
+/// side this is a finding.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn the_whole_calf_of_sts032_is_taken_with_a_finding() {
@@ -84,8 +84,8 @@ fn the_whole_calf_of_sts032_is_taken_with_a_finding() {
     }
 }
 
-/// The ankle sits where a person sees it (slice 20, z = 201 mm), a couch was cut away, and the
-/// other leg, whose bones lie around x = 52 mm, is gone.
+/// The ankle is where a person sees it (slice 20, z = 201 mm), a couch was cut away, and the other leg, with bones around
+/// x = 52 mm, is removed.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn the_right_leg_of_sts049_is_freed_from_couch_and_other_leg() {
@@ -144,8 +144,7 @@ fn both_containers_of_sts028_give_the_same_images() {
     }
 }
 
-/// The field of view cuts the forefoot of one and the kneecap of the other by its front face, within what the cameras show of the
-/// joint.
+/// The front face of the field of view cuts the forefoot of one limb and the kneecap of the other, within the cameras' view of the joint.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn cuts_of_sts049_and_sts028_are_refused_and_reported() {

@@ -1,4 +1,4 @@
-//! What a radiograph shows of an ankle's joint space agrees with what the geometry lets through, and more closely the less noise there is.
+//! The visibility of an ankle's joint space in a radiograph agrees with its geometric openness, the better the less noise there is.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use ppa_dataset::labels::BoneNumbers;
@@ -11,7 +11,7 @@ use ppa_xray::{Detector, Projection, VoxelPhantom, fast};
 const SOURCE_JOINT_MM: f64 = 1050.0;
 const SOURCE_DETECTOR_MM: f64 = 1150.0;
 
-/// The device before a right leg that is turned inwards: x along the rows, y distal, z from tube to detector.
+/// Pose of the device in front of a right leg that is rotated inwards: x along the rows, y distal, z from tube to detector.
 fn ct_from_device(joint: &Point3<f64>, axis: &Vector3<f64>, degrees: f64) -> Isometry3<f64> {
     let anterior = (-Vector3::y() + axis * axis.y).normalize();
     let turn = UnitQuaternion::from_scaled_axis(axis * -degrees.to_radians());
@@ -78,7 +78,7 @@ fn radiographs_rank_poses_as_geometry_does() {
                 space.visibility(&reading)
             })
             .collect();
-        // Where nothing is to be seen in any pose, nothing is ranked.
+        // If nothing is visible in any pose, the rank correlation is 0.
         let rank = |geometric: fn(&Openness) -> f64, visible_of: fn(&Visibility) -> f64| {
             let geometric: Vec<f64> = openness.iter().map(geometric).collect();
             let visible: Vec<f64> = visible.iter().map(visible_of).collect();
@@ -95,15 +95,15 @@ fn radiographs_rank_poses_as_geometry_does() {
         dark.0 < noisy.0 && noisy.0 < clear.0,
         "{dark:?} {noisy:?} {clear:?}"
     );
-    // Margins read in the wrong places still rank a clear image at 0.977, but a noisy one at 0.69.
+    // Margins read at the wrong places still give 0.977 for a clear image, but 0.69 for a noisy one.
     assert!(noisy.0 > 0.9 && clear.0 > 0.97, "{noisy:?} {clear:?}");
     // Poses are 2 degrees apart.
     let geometric: Vec<f64> = openness.iter().map(|open| open.worst()[1]).collect();
     assert!(most(&geometric).abs_diff(clear.1) <= 1, "{clear:?}");
 }
 
-/// Relative to the best that each gutter shows in several radiographs of one foot; the worst gutter decides. 0 throughout where
-/// a gutter is never seen.
+/// Visibility of each gutter relative to its best in several radiographs of one foot; the minimum over the gutters. 0
+/// throughout if a gutter is never visible.
 fn worst_relative(all: &[Visibility]) -> Vec<f64> {
     let relative = |of: fn(&Visibility) -> f64| -> Vec<f64> {
         let best = all.iter().map(of).fold(0.0, f64::max);
@@ -117,7 +117,7 @@ fn worst_relative(all: &[Visibility]) -> Vec<f64> {
         .collect()
 }
 
-/// Index of the largest.
+/// Index of the largest value.
 fn most(values: &[f64]) -> usize {
     (0..values.len())
         .max_by(|&a, &b| values[a].total_cmp(&values[b]))

@@ -1,10 +1,10 @@
-//! The structure of the workspace: which crate may depend on which.
+//! Structure of the workspace: which crates may depend on which.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Crates of the workspace and the crates each may depend on outside its tests.
+/// Crates of the workspace with the crates on which each may depend outside its tests.
 const ARROWS: &[(&str, &[&str])] = &[
     ("ppa-core", &[]),
     ("ppa-ct", &["ppa-core"]),
@@ -166,7 +166,7 @@ fn crates_depend_only_along_the_arrows() {
     }
 }
 
-/// What all crates share must not grow unnoticed.
+/// The dependencies shared by all crates must not grow unnoticed.
 #[test]
 fn the_shared_crate_has_exactly_its_listed_dependencies() {
     let manifest = &members()["ppa-core"];
@@ -182,7 +182,7 @@ fn the_shared_crate_has_exactly_its_listed_dependencies() {
     assert_eq!(of_targets, ["rustix"]);
 }
 
-/// Follows the lock file, so that a feature switched on by mistake is seen as well.
+/// Uses the lock file, so a feature that was switched on by mistake is found as well.
 #[test]
 fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
     for (name, forbidden) in FORBIDDEN {
@@ -194,7 +194,7 @@ fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
     }
 }
 
-/// Name and version of all that a crate links against, a line each.
+/// Names and versions of all crates linked into a crate, one per line.
 fn tree(which: &[&str]) -> Vec<String> {
     let tree = std::process::Command::new(env!("CARGO"))
         .args(["tree", "--locked", "--edges", "normal", "--prefix", "none"])

@@ -1,4 +1,4 @@
-//! Datasets and shards in tar archives, beside those in folders.
+//! Datasets and shards in tar archives and in folders.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,7 +14,7 @@ fn tar(folder: &Path, arguments: &[&str]) {
     assert!(done.status.success(), "tar {arguments:?}: {done:?}");
 }
 
-/// The files of a dataset but its lock, which no archive holds.
+/// The files of a dataset except its lock, which archives do not contain.
 fn files(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files: BTreeMap<_, _> = contents(root).into_iter().collect();
     files.remove(Path::new(".ppa/lock"));
@@ -37,13 +37,13 @@ fn an_archive_extracts_to_the_dataset_in_a_folder() {
         succeed(here, "verify whole --plan plan.toml").replace("whole:", "whole.tar:")
     );
 
-    // An archive that tar made of a folder, in another order.
+    // An archive that tar made from a folder, in another order.
     tar(here, &["-cf", "made_by_tar.tar", "-C", "whole", "."]);
     let status = succeed(here, "status made_by_tar.tar");
     assert!(status.contains("complete"), "{status}");
     succeed(here, "verify made_by_tar.tar --plan plan.toml");
 
-    // Shards in an archive of ppa, in a folder, and in an archive that tar made of a folder.
+    // Shards in an archive of ppa, in a folder, and in an archive that tar made from a folder.
     succeed(here, "generate plan.toml --shard 1/3 --out 1.tar");
     succeed(here, "generate plan.toml --shard 2/3 --out 2");
     succeed(here, "generate plan.toml --shard 3/3 --out 3");

@@ -7,8 +7,8 @@ use serde_json::Value;
 
 use crate::{QUICK_DEPTH, QUICK_XRAY, fail, succeed};
 
-/// A coarse phantom with its bones, its case and a dataset of radiographs from 0 to 36 degrees, `plan`. The labels
-/// follow from the poses alone, so the images are quick ones.
+/// Makes a coarse phantom with its bones, its case and a dataset `plan` of radiographs from 0 to 36 degrees. Labels depend
+/// on the poses alone, so the images are quick ones.
 fn dataset(here: &Path) {
     succeed(
         here,
@@ -43,7 +43,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     dataset(here);
     refusals(here);
     let said = json(&succeed(here, "label auto plan --json"));
-    // P01 turns its malleoli parallel to the detector at 18 degrees.
+    // The malleoli of P01 are parallel to the detector at 18 degrees.
     let best = said["limbs"][0]["best_angle_deg"].as_f64().unwrap();
     assert!((best - 18.0).abs() < 3.0, "{best}");
     let found = labels(here);
@@ -63,7 +63,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     assert!(curve[..middle].is_sorted_by(|a, b| a >= b), "{curve:?}");
     assert!(curve[middle..].is_sorted_by(|a, b| a <= b), "{curve:?}");
 
-    // Overlap falls on the way to the mortise view.
+    // Overlap decreases towards the mortise view.
     let table = fs::read_to_string(here.join("plan/patient_3/labels/r/openness.csv")).unwrap();
     let mut lines = table.lines();
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -76,7 +76,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     let clear = at(3, "tibiofibular_clear_space_mm");
     assert!((2.1..6.9).contains(&clear), "{clear}");
 
-    // What the labels were computed with.
+    // Settings with which the labels were computed.
     let with =
         || json(&fs::read_to_string(here.join("plan/patient_3/labels/r/openness.json")).unwrap());
     let by_hand = with();
@@ -86,11 +86,11 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     assert_eq!(by_hand["thresholds"]["hidden_mm"][2], 3.75);
     assert_eq!(by_hand["bones"]["sha256"].as_str().unwrap().len(), 64);
 
-    // The same labels again are no others.
+    // Computing the same labels again is allowed.
     succeed(here, "label auto plan");
     strict_labels_beside(here);
 
-    // Readers' labels win, whichever comes first, and whoever separated the bones; computed ones stay beside them.
+    // Readers' labels take precedence, in any order of import and whoever separated the bones; the computed ones are kept next to them.
     let folder_of_labels = here.join("plan/patient_3/labels/r");
     let computed =
         || json(&fs::read_to_string(folder_of_labels.join("labels.computed.json")).unwrap());
@@ -120,7 +120,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     );
     expected["xray_image_36.png"] = by_reader.clone();
     assert_eq!(labels(here), expected);
-    // All that reads labels takes the mixture.
+    // All commands that read labels accept the mixture.
     let checked = json(&succeed(here, "dataset check plan --json"));
     assert_eq!(checked["labelled"], 9);
     succeed(here, "export table plan --out labels.csv");
@@ -144,7 +144,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     assert_eq!(back["xray_image_36.png"]["label_source"], "readers");
     assert_eq!(back["xray_image_0.png"]["label_source"], "surrogate-jso/2");
 
-    // Other computed labels replace these on request only.
+    // Other computed labels replace these only on request.
     let said = fail(here, "label auto plan");
     assert!(said.contains("give --replace"), "{said}");
     assert_eq!(labels(here), expected);
@@ -164,7 +164,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     assert!((best - 18.0).abs() < 3.0, "{best}");
 }
 
-/// One leg in slices of 3.3 mm: what a person sees of its ankle is one gap, and what can be measured there is none.
+/// One leg in slices of 3.3 mm: the gap that a person sees in its ankle cannot be measured.
 #[test]
 #[ignore = "needs ../shared"]
 fn bones_of_a_leg_in_thick_slices_are_refused_with_the_place() {
@@ -183,7 +183,7 @@ fn bones_of_a_leg_in_thick_slices_are_refused_with_the_place() {
         "{said}"
     );
     assert!(said.contains("0.98 x 0.98 x 3.27 mm"), "{said}");
-    // Nothing half done, and a shaft without an ankle is no better.
+    // No partial files are left, and a shaft without an ankle is refused too.
     assert_eq!(fs::read_dir(here).unwrap().count(), 0);
     let knee = crate::shared().join("data/knee-calf-sts028/dicom");
     let said = fail(
@@ -197,7 +197,7 @@ fn bones_of_a_leg_in_thick_slices_are_refused_with_the_place() {
     assert_eq!(fs::read_dir(here).unwrap().count(), 0);
 }
 
-/// The strict scale under its own name: `labels.json` stays, and either set can be trained on.
+/// Labels of the strict scale have their own name: `labels.json` is kept, and either set can be trained on.
 fn strict_labels_beside(here: &Path) {
     let folder = here.join("plan/patient_3/labels/r");
     let before = labels(here);
@@ -240,7 +240,7 @@ fn strict_labels_beside(here: &Path) {
     assert!(echoed.contains("labels = \"strict\""), "{echoed}");
 }
 
-/// Nothing is written by what is refused.
+/// Refused commands write nothing.
 fn refusals(here: &Path) {
     let case = fs::read(here.join("p01.toml")).unwrap();
     let refused = |arguments: &str, expected: &str| {
@@ -293,7 +293,7 @@ fn refusals(here: &Path) {
         );
         assert!(!here.join("x.toml").exists() && !here.join("bones.nrrd").exists());
     }
-    // A second limb that the dataset lacks leaves the first without labels as well.
+    // A second limb missing from the dataset leaves the first without labels as well.
     let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
     let second = "[[case]]\nfile = \"p01.toml\"\npatient = 4\n[rotation]";
     fs::write(here.join("p01.toml"), &case).unwrap();
@@ -302,7 +302,7 @@ fn refusals(here: &Path) {
         "label auto plan --plan two.toml",
         "lists no radiographs of limb r of patient 4",
     );
-    // The same leg without the table: another scan.
+    // The same leg without the table is another scan.
     succeed(here, "ct phantom --out other.nii --spacing-mm 1.2");
     succeed(
         here,

@@ -1,4 +1,4 @@
-//! Surfaces, rooms and cameras that cannot be used: one clear sentence, a non-zero exit code, nothing half-written.
+//! Unusable surfaces, rooms and cameras: one clear sentence, a non-zero exit code, no partial files.
 
 use std::fs;
 
@@ -95,7 +95,7 @@ fn a_volume_of_one_slice_has_no_surface() {
 #[test]
 fn a_room_without_a_table_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    // A lattice of scattered points: nothing flat in it.
+    // A lattice of scattered points without a flat part.
     let mut ply = "ply\nformat ascii 1.0\nelement vertex 500\nproperty float x\n\
                    property float y\nproperty float z\nend_header\n"
         .to_owned();
@@ -119,7 +119,7 @@ fn a_room_without_a_table_is_refused() {
 fn a_camera_that_sees_nothing_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut rig = serde_json::to_value(ppa_depth::RigSpec::default()).unwrap();
-    // Turned about its x axis by 180 degrees: the camera looks at the ceiling.
+    // Rotated by 180 degrees about its x axis, the camera looks at the ceiling.
     rig["right"]["device_from_camera"] = serde_json::json!([
         [1.0, 0.0, 0.0, 0.0],
         [0.0, -1.0, 0.0, 0.0],
@@ -156,7 +156,7 @@ fn a_camera_inside_the_limb_is_refused() {
     assert_eq!(names(folder.path()), ["box.obj"]);
 }
 
-/// The sides of a person are no guess: whoever prepares a limb says which it is.
+/// The side of a limb is not guessed: the user must state it.
 #[test]
 fn a_limb_without_a_side_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -182,7 +182,7 @@ fn a_rig_or_a_room_that_cannot_be_used_is_named() {
     );
     contains(&said, &["rig.json", "left camera"]);
 
-    // A table whose points are all there twice: discs of no radius.
+    // A table with every point twice: discs of radius 0.
     let mut ply = "ply\nformat ascii 1.0\nelement vertex 20000\nproperty float x\n\
                    property float y\nproperty float z\nend_header\n"
         .to_owned();

@@ -1,4 +1,4 @@
-//! Bad input: one clear sentence, a non-zero exit code, nothing half-written.
+//! Bad input: one clear sentence, a non-zero exit code, no partial files.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn a_missing_file_is_named() {
     assert!(names(folder.path()).is_empty());
 }
 
-/// How a case's scan is read stands in the case.
+/// The options for reading a case's scan are stored in the case.
 #[test]
 fn a_case_is_not_read_otherwise() {
     let said = fail(phantom(), "xray audit p01.toml --force");

@@ -1,4 +1,4 @@
-//! Cases that a person edits, checks and looks at, and plans that begin from them.
+//! Cases that a person edits, checks and views, and plans that start from them.
 
 use std::fs;
 use std::path::Path;
@@ -9,14 +9,14 @@ use serde_json::Value;
 
 use crate::{contains, fail, names, phantom, succeed};
 
-/// A case of the coarse phantom in a folder of its own, with its scan.
+/// Copies the case of the coarse phantom and its scan into `folder`.
 fn own_case(folder: &Path) {
     fs::copy(phantom().join("p01.nii"), folder.join("p01.nii")).unwrap();
     let prepare = "prepare p01.nii --side r --no-picture --out leg.case.toml";
     succeed(folder, prepare);
 }
 
-/// Keys of `[choices]` that a case holds as comments with what was found, but for the points of the plane.
+/// Keys of `[choices]` that a case contains as comments with the values found, except the points of the plane.
 const CHOICES: [&str; 7] = [
     "limb",
     "joint_centre",
@@ -34,7 +34,7 @@ fn edit(folder: &Path, from: &str, to: &str) {
     fs::write(path, text.replacen(from, to, 1)).unwrap();
 }
 
-/// The line of a key that is switched off, switched on.
+/// Uncomments the line of a key and returns it.
 fn switch_on(folder: &Path, key: &str) -> String {
     let text = fs::read_to_string(folder.join("leg.case.toml")).unwrap();
     let begin = format!("#{key} = ");
@@ -56,7 +56,7 @@ fn kept_bodies_are_named_in_the_case() {
         leg.surface.kept.is_empty() && !text.contains("kept"),
         "{text}"
     );
-    // A point of the limb itself is written down and changes nothing else.
+    // A point of the limb itself is recorded and changes nothing else.
     let [x, y, z] = PreparedLimb::of_case(&leg).unwrap().landmarks.joint_centre;
     let prepare = "prepare p01.nii --side r --no-picture";
     let keep = format!("{prepare} --keep={x},{y},{z} --out kept.case.toml");
@@ -168,7 +168,7 @@ fn only_what_was_chosen_stands_in_the_choices() {
     );
 }
 
-/// Whatever key is chosen alone, the case can be carried out; with the value that was found nothing changes.
+/// A case with any single key chosen can be used; with the value that was found nothing changes.
 #[test]
 fn any_key_of_the_choices_can_be_chosen_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -231,7 +231,7 @@ fn any_key_of_the_choices_can_be_chosen_alone() {
     assert_eq!(check()["changed"]["other_limb"], true);
 }
 
-/// As cases were written when all choices were filled in.
+/// Old cases, with all choices filled in.
 #[test]
 fn a_case_with_all_choices_is_read_as_it_was() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,4 @@
-//! Plans as jobs of Slurm: scripts without Slurm, and submissions to programs that answer as Slurm does.
-//! `.ci/slurm` runs jobs on a real one.
+//! Plans as Slurm jobs: scripts without Slurm, and submissions to programs that imitate Slurm. `.ci/slurm` runs jobs on a real one.
 #![cfg(unix)]
 
 use std::fs;
@@ -12,7 +11,7 @@ use serde_json::Value;
 use crate::shards::write_quick_plan;
 use crate::{contains, ppa};
 
-/// A folder with the quick plan of five poses, and a folder `bin` for programs of Slurm.
+/// A folder with the quick plan of five poses, and a folder `bin` for Slurm programs.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_quick_plan(folder.path());
@@ -20,8 +19,8 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Programs that answer as those of Slurm: arrays of two tasks, the queue in the file `queue`, and the arguments of each
-/// sbatch and scancel as a line of the file `calls`.
+/// Adds programs that imitate Slurm: arrays of two tasks, the queue in the file `queue`, and the arguments of each sbatch
+/// and scancel as a line of the file `calls`.
 pub fn with_slurm() -> tempfile::TempDir {
     let folder = folder();
     let log = "echo \"${0##*/} $*\" >>calls";
@@ -44,7 +43,7 @@ pub fn with_slurm() -> tempfile::TempDir {
     folder
 }
 
-/// `ppa` with no other programs than those of the folder `bin`.
+/// `ppa` with only the programs of the folder `bin`.
 pub fn isolated(folder: &Path, arguments: &str) -> Command {
     let mut command = ppa(folder, arguments);
     command.env("PATH", folder.join("bin"));
@@ -72,7 +71,7 @@ pub fn calls(folder: &Path) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Times of a pose and limits that give three shards.
+/// A time per pose and limits that give three shards.
 const THREE: &str = "submit slurm plan.toml --out jobs --pose-seconds 1200";
 
 #[test]
@@ -95,7 +94,7 @@ fn a_dry_run_writes_scripts_without_slurm() {
             "--threads 2 generate",
         ],
     );
-    // The plan may still be edited, and options changed.
+    // The plan and the options can still be changed.
     fs::write(
         here.join("plan.toml"),
         fs::read_to_string(here.join("plan.toml"))
@@ -152,7 +151,7 @@ fn only_missing_shards_are_submitted_again() {
     assert!(first[1].ends_with("shard.sh 2"), "{first:?}");
     assert!(first[2].contains("--dependency=afterany:1:2 --kill-on-invalid-dep=yes"));
 
-    // One shard is made, one runs, one is lost; the merge waits.
+    // One shard is done, one is running, one was killed; the merge waits.
     crate::succeed(
         here,
         "generate jobs/slurm/plan.toml --shard 1/3 --out jobs/shards/1",
@@ -176,7 +175,7 @@ fn only_missing_shards_are_submitted_again() {
         (&"running".into(), &"n1".into())
     );
     assert_eq!(report["merge"]["reason"], "Dependency");
-    // Five poses of 1200 s, one of them made, on one core.
+    // Five poses of 1200 s, one of them finished, on one core.
     let hours = &report["core_hours"];
     for (key, expected_s) in [
         ("estimated", 6000.0),
@@ -249,7 +248,7 @@ fn a_damaged_shard_is_submitted_again_after_a_check() {
     fs::write(here.join("jobs/shards/2").join(image), flipped).unwrap();
     assert_eq!(submitted(""), serde_json::json!([]));
     assert_eq!(submitted(" --check"), serde_json::json!([2]));
-    // What the task runs makes the image again.
+    // The command of the task makes the image again.
     crate::succeed(
         here,
         "generate jobs/slurm/plan.toml --shard 2/3 --out jobs/shards/2",

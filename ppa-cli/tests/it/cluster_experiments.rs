@@ -1,4 +1,4 @@
-//! Experiments as jobs of Slurm, each training a task.
+//! Experiments as Slurm jobs, one training run per task.
 #![cfg(unix)]
 
 use std::fs;
@@ -56,7 +56,7 @@ fn each_training_of_an_experiment_is_a_task() {
     let script = fs::read_to_string(here.join("jobs/slurm/training.sh")).unwrap();
     assert!(script.contains("#SBATCH --gres=gpu:1\n"), "{script}");
 
-    // What tasks 2 and 3 run; task 3 is killed before its end.
+    // The commands of tasks 2 and 3; task 3 is killed before its end.
     let train = |part: &str| {
         let arguments =
             format!("experiment 1 jobs/slurm/plan.toml --out jobs/runs --shard {part}/16");

@@ -1,4 +1,4 @@
-//! Histories of a command divided into jobs of Slurm, whose scripts run here.
+//! Histories of a command divided into Slurm jobs, whose scripts run here.
 #![cfg(unix)]
 
 use std::fs;
@@ -70,7 +70,7 @@ fn a_radiograph_in_tasks_has_the_bytes_of_one_run() {
     assert_eq!(said["submitted"], serde_json::json!([2]));
     let output = run_script(here, "jobs/slurm/part.sh", Some(2));
     assert!(output.status.success(), "{output:?}");
-    // What somebody has put there since stays.
+    // A file created there in the meantime is kept.
     let exr = here.join("parts.exr");
     fs::write(&exr, "of somebody").unwrap();
     let output = run_script(here, "jobs/slurm/merge.sh", None);
@@ -117,7 +117,7 @@ fn a_radiograph_in_tasks_has_the_bytes_of_one_run() {
     assert!(said.contains("the command differs"), "{said}");
 }
 
-/// As [`succeed`], with `--json` before the command behind `--`.
+/// Like [`succeed`], with `--json` before the command behind `--`.
 fn succeed_before(folder: &Path, arguments: &str) -> Value {
     let arguments = arguments.replacen("submit slurm", "--json submit slurm", 1);
     let output = isolated(folder, &arguments).output().unwrap();
@@ -150,12 +150,12 @@ fn a_scan_in_tasks_has_the_bytes_of_one_run() {
     let output = run_script(here, "two/slurm/merge.sh", None);
     assert!(output.status.success(), "{output:?}");
     assert!(crate::contents(&here.join("parts")) == crate::contents(&here.join("one")));
-    // As if it had been killed before its last line.
+    // As if the merge had been killed before its last line.
     let output = run_script(here, "two/slurm/merge.sh", None);
     assert!(output.status.success(), "{output:?}");
     assert!(crate::contents(&here.join("parts")) == crate::contents(&here.join("one")));
 
-    // A tally of another seed is found by the merge.
+    // The merge detects a tally of another seed.
     let other = command("two/parts/2").replace("--seed 3", "--seed 4 --replace --part 2/2");
     crate::succeed(here, &other);
     let said = crate::fail(

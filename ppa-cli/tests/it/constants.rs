@@ -1,4 +1,4 @@
-//! Predictions that are all the same.
+//! Predictions that are all equal.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! `ppa ct convert` with changes on the way: crop, upright, spacing.
+//! `ppa ct convert` with changes: crop, upright, spacing.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::{fail, names, succeed};
 
-/// Voxels of 1 x 1 x 2 mm that lean by `lean_mm` along y from slice to slice; each holds its number.
+/// Voxels of 1 x 1 x 2 mm, sheared by `lean_mm` along y from slice to slice; each contains its number.
 fn volume(lean_mm: f64) -> Volume {
     let mut matrix = Matrix4::from_diagonal(&Vector4::new(1.0, 1.0, 2.0, 1.0));
     matrix[(1, 2)] = lean_mm;
@@ -44,7 +44,7 @@ fn boxes_are_cut_out_in_voxels_or_in_millimetres() {
 #[test]
 fn a_tilted_stack_is_set_upright_before_millimetres_are_cut() {
     let folder = tempfile::tempdir().unwrap();
-    // Whole voxels from slice to slice, so that every value arrives as it is.
+    // A shear of whole voxels per slice, so every value is copied unchanged.
     let scan = volume(1.0);
     write(&folder.path().join("scan.nrrd"), &scan).unwrap();
     let (kept, info) = converted(folder.path(), "");
@@ -62,10 +62,10 @@ fn a_tilted_stack_is_set_upright_before_millimetres_are_cut() {
     }
     assert_eq!(upright.at([0, 9, 0]), -1000.0 + 108.0);
     assert_eq!(upright.at([0, 10, 0]), -1000.0);
-    // y from 7 to 9 lies in every slice of the upright stack, and is a block of it.
+    // y from 7 to 9 is in every slice of the upright stack and forms a block.
     let (block, _) = converted(folder.path(), "--upright --crop-mm=-1,20,6.5,9.5,-500,0");
     assert_eq!(block.grid().size(), [12, 3, 8]);
-    // Voxels are those of the scan as read.
+    // Voxel indices are those of the scan as read.
     let (slab, _) = converted(folder.path(), "--upright --crop 0,12,0,10,0,2");
     assert_eq!(slab.grid().size(), [12, 11, 2]);
 }
@@ -83,7 +83,7 @@ fn a_new_spacing_keeps_the_box() {
     write(&folder.path().join("scan.nrrd"), &scan).unwrap();
     let (fine, info) = converted(folder.path(), "--spacing-mm 0.5");
     assert_eq!(info["size"], serde_json::json!([24, 20, 32]));
-    // Linear between the centres.
+    // Linear interpolation between the centres.
     let middle = Point3::new(5.25, 4.75, 7.25);
     assert!((fine.sample(&middle).unwrap() - scan.sample(&middle).unwrap()).abs() < 1e-3);
     let (coarse, info) = converted(folder.path(), "--spacing-mm 2,2.5,4");
@@ -111,7 +111,7 @@ fn changes_that_make_no_volume_are_refused() {
         );
         assert!(said.contains(part), "{arguments}: {said}");
     }
-    // Told by the parser, which adds how to continue.
+    // Reported by the parser, which adds how to continue.
     for (arguments, part) in [
         ("--crop 1,2,3", "6 voxel indices"),
         ("--crop-mm 0,1,0,1", "6 numbers"),

@@ -1,4 +1,4 @@
-//! `ppa depth coverage`: places of cameras compared.
+//! `ppa depth coverage`: comparison of camera places.
 
 use std::fs;
 
@@ -34,11 +34,11 @@ fn places_are_ranked_drawn_and_written() {
             .all(|pair| (100.0 * pair[0]).round() >= (100.0 * pair[1]).round()),
         "{shares:?}"
     );
-    // No camera sees the side that lies on the table.
+    // No camera sees the side that faces the table.
     assert!(shares[0] > 0.3 && shares[0] < 0.7, "{shares:?}");
     for place in places.iter().filter(|place| place["name"] == "dome") {
         let side_mm = place["mm_per_pixel"].as_f64().unwrap();
-        // Square on at 700 mm a pixel is 700 / 505 mm; the joint's surface lies a little nearer, and is oblique.
+        // Perpendicular at 700 mm, a pixel is 700 / 505 mm; the joint's surface is a little nearer, and oblique.
         assert!((1.2..2.2).contains(&side_mm), "{side_mm}");
     }
     let table = fs::read_to_string(folder.path().join("c.csv")).unwrap();
@@ -46,7 +46,7 @@ fn places_are_ranked_drawn_and_written() {
     let plot = image::open(folder.path().join("c.png")).unwrap();
     assert!(plot.width() > 1000);
 
-    // Places of one's own: the best place again, and its mirror image below the table, where the table hides all.
+    // User-defined places: the best place again, and its mirror image below the table, where the table hides everything.
     let best = &places[0]["room_from_camera"];
     let below = "[[1,0,0,0],[0,1,0,0],[0,0,1,-700],[0,0,0,1]]";
     let own = format!(

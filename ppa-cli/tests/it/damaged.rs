@@ -1,4 +1,4 @@
-//! Checks, damages and repairs a finished dataset.
+//! Checks and repairs of a damaged dataset.
 
 use std::fs;
 
@@ -47,7 +47,7 @@ fn a_dataset_is_verified_by_making_a_part_of_it_again() {
     );
 }
 
-/// Records and hashes that fit each other do not hide an image that the plan does not make.
+/// An image that the plan does not make is found even if records and hashes are consistent.
 #[test]
 fn a_forged_image_is_found_when_its_pose_is_made_again() {
     let folder = copy();
@@ -135,13 +135,13 @@ fn what_was_altered_is_named_and_nothing_is_lost() {
     assert!(contents(&root) == before);
 }
 
-/// Until a run has replaced what is missing, no manifest shows that the dataset is whole.
+/// Until a run has replaced what is missing, no manifest marks the dataset as complete.
 #[test]
 fn a_broken_run_over_a_finished_dataset_leaves_no_manifest() {
     let folder = copy();
     let root = folder.path().join("plan");
     fs::remove_file(root.join("patient_3/xray/r/xray_image_0.png")).unwrap();
-    // A folder where an image belongs cannot be written over.
+    // A folder in the place of an image cannot be overwritten.
     fs::create_dir(root.join("patient_3/xray/r/xray_image_0.png")).unwrap();
     let said = fail(folder.path(), "generate plan.toml --progress quiet");
     assert!(said.contains("xray_image_0.png"), "{said}");

@@ -1,4 +1,4 @@
-//! Datasets checked, split and converted as a user does it.
+//! Datasets checked, split and converted with the program.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn dataset() -> &'static Path {
     folder.path()
 }
 
-/// A copy of it that may be changed.
+/// A copy of that dataset that may be changed.
 fn copy() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in contents(&dataset().join("data")) {
@@ -132,7 +132,7 @@ fn persons_are_split_and_leaks_refused() {
         "{said}"
     );
     succeed(folder.path(), "dataset split data --part train=1");
-    // The same split again is no other.
+    // Repeating the same split is allowed.
     succeed(folder.path(), "dataset split data --part train=1");
     let path = data.join("splits/default.json");
     let split: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
@@ -216,7 +216,7 @@ fn tables_and_archives_are_written_from_a_generated_dataset() {
     assert!(said.contains("manifest.jsonl"), "{said}");
 }
 
-/// Nothing on it comes from elsewhere, and nothing shows where the dataset lay.
+/// The page loads nothing from elsewhere and does not reveal the location of the dataset.
 #[test]
 fn the_page_of_a_dataset_stands_by_itself() {
     let folder = copy();
@@ -244,7 +244,7 @@ fn the_page_of_a_dataset_stands_by_itself() {
     }
     assert!(page.contains("aria-label=\"colours of depths from "));
     assert!(page.contains("Fewer than 9 poses") && page.contains("matches manifest.jsonl"));
-    // What is damaged is reported, and where it would stand is a cross: there is a page when one is needed.
+    // Damaged images are reported and shown as a cross; the page is still written.
     let images = [
         "patient_3/depth/r/orig/depth_cam_left_0.0.png",
         "patient_3/xray/r/xray_image_0.png",

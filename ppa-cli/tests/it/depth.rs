@@ -1,4 +1,4 @@
-//! `ppa depth`: a camera from OpenCV's calibration, a recording through a sensor, and its noise found again.
+//! `ppa depth`: a camera from OpenCV's calibration, a recording through a sensor, and a fit of its noise.
 
 use std::fs;
 use std::path::Path;
@@ -47,7 +47,7 @@ fn fit_noise_recovers_noise_for_any_number_of_threads() {
 
     let fit = "depth fit-noise one --camera camera.json --out fitted.json --json";
     let fitted: Value = serde_json::from_str(&succeed(folder.path(), fit)).unwrap();
-    // The default's 1.14 mm; 7 700 pixels of 12 frames determine it to about 0.5 %.
+    // The default is 1.14 mm; 7 700 pixels of 12 frames determine it to about 0.5 %.
     let found = fitted["random"]["at_unit_signal_mm"].as_f64().unwrap();
     assert!((found / 1.14 - 1.0).abs() < 0.03, "{found}");
     let again = "depth render wall.ply --camera camera.json --sensor fitted.json --out again.png";
@@ -94,7 +94,7 @@ fn invalid_cameras_recordings_and_sensors_are_refused() {
     );
 }
 
-/// A square of side 2 `half_mm` across the camera's axis.
+/// A square of side 2 `half_mm` perpendicular to the camera's axis.
 fn square(half_mm: f64, z_mm: f64) -> String {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let vertex = |[x, y]: [f64; 2]| format!("v {} {} {z_mm}\n", x * half_mm, y * half_mm);

@@ -1,4 +1,4 @@
-//! Runs that are killed or cannot write, over and over, end in the dataset of an undisturbed run.
+//! Runs that are repeatedly killed or cannot write still end with the dataset of an undisturbed run.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crate::shards::{whole, write_quick_plan};
 use crate::{contents, ppa, succeed};
 
-/// Marsaglia's xorshift: which moments are tried stays the same from run to run.
+/// Marsaglia's xorshift, so that every run tries the same moments.
 struct Moments(u64);
 
 impl Moments {
@@ -20,7 +20,7 @@ impl Moments {
     }
 }
 
-/// Kills a run (SIGKILL) after a while; whether it was still at work.
+/// Kills a run (SIGKILL) after `wait` and returns whether it was still running.
 fn kill_after(folder: &Path, arguments: &str, wait: Duration) -> bool {
     let mut command = ppa(folder, arguments);
     let mut run = command
@@ -35,9 +35,9 @@ fn kill_after(folder: &Path, arguments: &str, wait: Duration) -> bool {
     at_work
 }
 
-/// Runs `arguments` where no file may grow beyond `kilobytes`, as on a disk that refuses writes.
+/// Runs `arguments` with file sizes limited to `kilobytes`, as on a disk that refuses writes.
 fn run_with_small_files(folder: &Path, arguments: &str, kilobytes: u64) -> std::process::Output {
-    // A write beyond the limit fails instead of killing the process, since the signal is ignored.
+    // Since the signal is ignored, a write beyond the limit fails instead of killing the process.
     let script = format!("trap '' XFSZ; ulimit -f {kilobytes}; exec \"$0\" {arguments}");
     Command::new("bash")
         .args(["-c", &script, env!("CARGO_BIN_EXE_ppa")])
@@ -46,7 +46,7 @@ fn run_with_small_files(folder: &Path, arguments: &str, kilobytes: u64) -> std::
         .unwrap()
 }
 
-/// Removes one image that is there, so that a finished dataset gives the next run work.
+/// Removes one image so that the next run over a finished dataset has work to do.
 fn lose_an_image(root: &Path, moments: &mut Moments) {
     if !root.exists() {
         return; // killed before it began
@@ -62,8 +62,7 @@ fn lose_an_image(root: &Path, moments: &mut Moments) {
     }
 }
 
-/// Images that a record vouches for have the recorded hash, whenever the run was killed; those
-/// that are gone are made again.
+/// Images listed in a record have the recorded hash, whenever the run was killed; missing ones are made again.
 fn assert_records_are_true(root: &Path) {
     let Ok(records) = fs::read_dir(root.join(".ppa")) else {
         return;
@@ -124,7 +123,7 @@ fn fifty_kills_and_refused_writes_change_no_byte() {
     assert!(contents(&root) == expected);
 }
 
-/// Merging is nearly all reading and writing, so a kill often meets it at work on a file.
+/// Merging is almost only reading and writing, so a kill often hits it while it handles a file.
 #[test]
 fn a_merge_that_is_killed_resumes() {
     let folder = tempfile::tempdir().unwrap();

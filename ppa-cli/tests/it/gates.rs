@@ -1,4 +1,4 @@
-//! What `ppa prepare` doubts about phantoms and real limbs.
+//! Findings of `ppa prepare` about phantoms and real limbs.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::{contains, fail, shared};
 
-/// As `ppa prepare` finds it, or with `--limb other` where neither an ankle nor a knee shows.
+/// Prepares a limb like `ppa prepare`, or with `--limb other` if neither an ankle nor a knee is visible.
 fn limb(scan: &Path, side: Side) -> Result<PreparedLimb, PrepareError> {
     let with = |kind: Option<LimbKind>| {
         let choices = LandmarkOverrides {
@@ -29,7 +29,7 @@ fn limb(scan: &Path, side: Side) -> Result<PreparedLimb, PrepareError> {
     }
 }
 
-/// Codes of the findings of at least that severity.
+/// Codes of the findings with at least the given severity.
 fn codes(limb: &PreparedLimb, least: Severity) -> Vec<FindingCode> {
     let found = limb.findings.iter();
     let mut codes: Vec<_> = found
@@ -40,7 +40,7 @@ fn codes(limb: &PreparedLimb, least: Severity) -> Vec<FindingCode> {
     codes
 }
 
-/// A leg has no finding above a note when its side is given correctly, and only the mismatch otherwise.
+/// A leg has no finding above a note if its side is given correctly, and only the mismatch otherwise.
 fn is_clear_and_a_swap_is_reported(number: u32, side: Side) {
     let folder = tempfile::tempdir().unwrap();
     let scan = folder.path().join("leg.nii");
@@ -75,7 +75,7 @@ fn seventeen_phantoms_are_clear_and_all_swaps_are_reported() {
     });
 }
 
-/// A right leg, and a left one that is pressed into it by some voxels.
+/// A right leg, and a left one pressed into it by `pressed_mm`.
 fn two_legs(pressed_mm: f64) -> Volume {
     const SPACING_MM: f64 = 2.0;
     let of = |side| {
@@ -122,7 +122,7 @@ fn two_legs(pressed_mm: f64) -> Volume {
     Volume::new(grid, hu).unwrap()
 }
 
-/// Apart they are two limbs of which one is taken; pressed together by 12 mm they are one body with two tibiae.
+/// Apart, they are two limbs of which one is taken; pressed together by 12 mm, they are one body with two tibiae.
 #[test]
 fn legs_pressed_together_are_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -219,7 +219,7 @@ fn a_slab_of_a_leg_is_too_short() {
     );
 }
 
-/// 19 cm³ of a head phantom of plastic were once posed as a limb.
+/// 19 cm³ of a plastic head phantom were once posed as a limb.
 #[test]
 #[ignore = "needs ../shared/data/head-phantom-tilt"]
 fn a_part_of_a_head_phantom_is_refused() {
@@ -232,8 +232,8 @@ fn a_part_of_a_head_phantom_is_refused() {
     contains(&said, &["cm³", "expected a limb"]);
 }
 
-/// By eye, in their slices: the legs of sts049, sts025 and sts032 are right ones and that of sts028 is a left one; sts042 is cut
-/// behind, where its plane lies; two hands touch in sts019.
+/// Checked by eye in the slices: the legs of sts049, sts025 and sts032 are right legs, that of sts028 is a left leg; sts042 is
+/// cut posteriorly, at its plane; two hands touch in sts019.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn real_limbs_have_the_findings_that_an_eye_confirms() {

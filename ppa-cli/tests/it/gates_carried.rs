@@ -1,4 +1,4 @@
-//! Findings from the case to the training: repeated until they are acknowledged.
+//! Findings carried from the case to the training: repeated until they are acknowledged.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn both(folder: &Path, arguments: &str) -> (String, String) {
     (String::from_utf8(output.stdout).unwrap(), stderr)
 }
 
-/// A plan of two poses of a right leg that is said to be a left one.
+/// Writes a plan of two poses of a right leg that is declared to be a left one.
 fn write_wrong_side(folder: &Path) -> String {
     succeed(
         folder,

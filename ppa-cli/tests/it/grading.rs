@@ -1,4 +1,4 @@
-//! From a dataset to readers and back: the page that they get, and the labels that their grades become.
+//! From a dataset to readers and back: the page they get, and the labels made from their grades.
 
 use std::fs;
 use std::path::Path;
@@ -26,7 +26,7 @@ fn key(folder: &Path) -> Vec<[String; 3]> {
     lines.map(|line| cells(line).try_into().unwrap()).collect()
 }
 
-/// What a page saves when a reader gives the nth picture the nth grade.
+/// Writes the file that a page saves when a reader gives the nth picture the nth grade.
 fn grade(folder: &Path, reader: &str, grades: &[f64]) {
     let mut csv = "image,reader,grade\n".to_owned();
     for ([name, ..], grade) in key(folder).iter().zip(grades) {
@@ -76,7 +76,7 @@ fn grades_become_labels_and_are_kept() {
     let again = (0..key.len())
         .find(|&n| key[..n].iter().any(|before| before[1] == key[n][1]))
         .unwrap();
-    // The published example: 1, 1.5, 1.5 and 2 have mean 1.5 and std 0.35355; repeats count nowhere.
+    // The published example: 1, 1.5, 1.5 and 2 have mean 1.5 and std 0.35355; repeats are not counted.
     for (reader, grade_given) in [("a", 1.0), ("b", 1.5), ("c, d", 1.5), ("e", 2.0)] {
         let mut grades = [grade_given; 6];
         grades[again] = 3.0;
@@ -107,7 +107,7 @@ fn grades_become_labels_and_are_kept() {
     assert_eq!(agreed["images"], 5);
     assert_eq!(agreed["readers"][0]["against_self"]["mae"], 2.0);
 
-    // Another reader adds to what is there; without it, that would be lost.
+    // Another reader adds to the existing grades; a file without these would lose them.
     grade(here, "f", &[3.0; 4]);
     let lost = fail(here, "label import data --key out.key.csv f.csv");
     assert!(lost.contains("none of the given files does"), "{lost}");
@@ -146,7 +146,7 @@ fn a_flipped_bit_in_labels_grades_or_a_split_is_found() {
         }
         fs::write(root.join(file), bytes).unwrap();
     }
-    // Labels that were recorded stay so when others are added.
+    // Recorded labels stay recorded when others are added.
     succeed(here, "dataset split data --name other --part train=1");
     fs::remove_file(root.join("grades.csv")).unwrap();
     let said = fail(here, "dataset check data");
@@ -187,7 +187,7 @@ fn grades_that_cannot_be_are_named_and_nothing_is_written() {
     let twice = fail(here, "label import data --key out.key.csv a.csv b.csv");
     assert!(twice.contains("in a.csv and again in b.csv"), "{twice}");
 
-    // The dataset was replaced since, with another seed.
+    // The dataset was replaced in the meantime, with another seed.
     let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
     fs::write(here.join("plan.toml"), format!("seed = 9\n{plan}")).unwrap();
     succeed(here, "generate plan.toml --out data --replace");
@@ -212,14 +212,14 @@ fn no_grade_and_no_label_of_readers_is_lost() {
         assert_eq!(before[file_name(image)]["radiograph_sha256"], **sha256);
     }
 
-    // Second grades, and other grades than those that are there, are not let go.
+    // Imports that would drop second grades or change existing grades are refused.
     grade(here, "a", &[1.0, 1.5, 2.0, 2.5, 3.0]);
     let lost = fail(here, "label import data --key out.key.csv a.csv");
     assert!(lost.contains("holds a's grade"), "{lost}");
     grade(here, "a", &[3.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
     let lost = fail(here, "label import data --key out.key.csv a.csv");
     assert!(lost.contains("holds a's grade 1 of"), "{lost}");
-    // Files that hold all of it, in any number: a page may have been saved in parts.
+    // Any number of files that together contain all grades: a page may have been saved in parts.
     let whole = "image,reader,grade\n".to_owned();
     let row = |n: usize, grade: f64| format!("{},a,{grade}\n", key[n][0]);
     let grades = [1.0, 1.5, 2.0, 2.5, 3.0, 3.0];
@@ -239,7 +239,7 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     );
     assert!(twice.contains("a grades"), "{twice}");
 
-    // Labels of readers whose grades are elsewhere.
+    // Labels of readers whose grades are not in the dataset.
     fs::rename(here.join("data/grades.csv"), here.join("grades.csv")).unwrap();
     let refused = fail(here, "label import data --key out.key.csv p.csv");
     assert!(
@@ -247,7 +247,7 @@ fn no_grade_and_no_label_of_readers_is_lost() {
         "{refused}"
     );
     assert_eq!(labels(here), before);
-    // Grades from which they follow are taken, as after an import that was stopped before it wrote grades.csv.
+    // Grades that give these labels are accepted, as after an import that was stopped before it wrote grades.csv.
     succeed(here, "label import data --key out.key.csv p.csv q.csv");
     assert_eq!(
         fs::read_to_string(here.join("data/grades.csv")).unwrap(),
@@ -255,7 +255,7 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     );
     assert_eq!(labels(here), before);
 
-    // The radiographs are replaced: labels and grades belong to the old ones.
+    // The radiographs are replaced, but labels and grades belong to the old ones.
     let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
     fs::write(here.join("plan.toml"), format!("seed = 9\n{plan}")).unwrap();
     let done = ppa(here, "generate plan.toml --out data --replace")

@@ -1,4 +1,4 @@
-//! Input that would hang the program or end it without a word: pipes, devices, and less memory than a scan takes.
+//! Input that could hang the program or kill it without a message: pipes, devices, and less memory than a scan needs.
 #![cfg(unix)]
 
 use std::fs;
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::{contains, fail, names, phantom, ppa, shared};
 
-/// What a command says that must end by itself; it is ended after a minute.
+/// Output of a command that must end by itself; after a minute it is killed and the test fails.
 fn ended(mut command: Command) -> Output {
     let mut child = command
         .stdout(Stdio::piped())
@@ -28,7 +28,7 @@ fn ended(mut command: Command) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// A failure reported in one sentence.
+/// Returns the one-sentence message of a failure.
 fn sentence(output: &Output) -> String {
     let said = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
@@ -101,7 +101,7 @@ fn named_pipes_are_refused_wherever_a_file_is_named() {
         contains(&said, &["found a named pipe, expected a regular file"]);
     }
     for (command, pipe) in [("ct info h.nhdr", "v.raw"), ("ct info h.mhd", "v.raw")] {
-        // A link that stays beside the header leads to the pipe.
+        // A link that remains next to the header points to the pipe.
         contains(
             &sentence(&ended(ppa(here, command))),
             &[pipe, "a named pipe"],
@@ -111,8 +111,8 @@ fn named_pipes_are_refused_wherever_a_file_is_named() {
     assert_eq!(names(here), before, "nothing was written");
 }
 
-/// Runs `ppa` with an address space of this many megabytes, which replace LIMIT in its arguments: whether it succeeded. If
-/// not, it said why in one sentence.
+/// Runs `ppa` with an address space of `megabytes`, which also replaces LIMIT in its arguments. Returns whether it
+/// succeeded; a failure must be reported in one sentence.
 fn with_memory(folder: &Path, megabytes: usize, arguments: &str) -> bool {
     let arguments = arguments.replace("LIMIT", &megabytes.to_string());
     let script = format!("ulimit -v {}; exec \"$0\" {arguments}", 1024 * megabytes);
@@ -120,7 +120,7 @@ fn with_memory(folder: &Path, megabytes: usize, arguments: &str) -> bool {
     command
         .current_dir(folder)
         .args(["-c", &script, env!("CARGO_BIN_EXE_ppa")])
-        // glibc reserves address space for every thread that happens to allocate.
+        // glibc reserves address space for every thread that allocates.
         .env("MALLOC_ARENA_MAX", "1");
     let output = ended(command);
     if !output.status.success() {
@@ -129,7 +129,7 @@ fn with_memory(folder: &Path, megabytes: usize, arguments: &str) -> bool {
     output.status.success()
 }
 
-/// From little more than the program itself takes to enough: how often memory sufficed, and how often not.
+/// Number of successes and failures at limits from barely more than the program itself needs to enough.
 fn over_limits(folder: &Path, arguments: &str) -> (usize, usize) {
     let (enough, short): (Vec<_>, Vec<_>) = [100, 200, 300, 500, 900]
         .into_iter()
@@ -141,7 +141,7 @@ fn over_limits(folder: &Path, arguments: &str) -> (usize, usize) {
 fn too_little_memory_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    // 384^3 voxels of 4 bytes behind a phantom's header: 226 MB of zeros that take no room on the disk.
+    // 384^3 voxels of 4 bytes behind a phantom's header: 226 MB of zeros that take no disk space.
     let side = 384_u16;
     let mut bytes = fs::read(phantom().join("p01.nii")).unwrap();
     bytes.truncate(352);
@@ -175,7 +175,7 @@ fn a_real_limb_in_too_little_memory_is_refused() {
     }
 }
 
-/// Spreadsheets run such cells when they open `grades.csv`.
+/// Spreadsheets execute such cells when they open `grades.csv`.
 #[test]
 fn readers_whose_names_are_formulas_are_refused() {
     let folder = tempfile::tempdir().unwrap();

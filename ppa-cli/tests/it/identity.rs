@@ -1,4 +1,4 @@
-//! Nothing that identifies a person, a place, a date or an instance of a source reaches an output.
+//! No output reveals a person, a place, a date or an instance of a source.
 
 use std::fs;
 use std::io::Read;
@@ -10,7 +10,7 @@ use base64::engine::general_purpose::STANDARD;
 use crate::planted_series::{self, DATES, UID_ROOT, WORD};
 use crate::{QUICK_XRAY, succeed};
 
-/// What must not be found, in the encodings that text comes in; upper and lower case are alike.
+/// Planted words in all text encodings, in lower case.
 fn planted() -> Vec<Vec<u8>> {
     let words = [WORD, UID_ROOT].into_iter().chain(DATES);
     let in_encodings = |word: &str| {
@@ -25,7 +25,7 @@ fn planted() -> Vec<Vec<u8>> {
     words.flat_map(in_encodings).collect()
 }
 
-/// The first planted thing in some bytes.
+/// The first planted word in some bytes.
 fn leak(bytes: &[u8]) -> Option<String> {
     let bytes = bytes.to_ascii_lowercase();
     let found = planted()
@@ -34,7 +34,7 @@ fn leak(bytes: &[u8]) -> Option<String> {
     found.map(|word| String::from_utf8_lossy(&word).into_owned())
 }
 
-/// Every layer of a file: as it lies, unpacked, and the pictures inside a page.
+/// All layers of a file: as stored, unpacked, and the pictures inside a page.
 fn layers(bytes: Vec<u8>) -> Vec<Vec<u8>> {
     let mut layers = Vec::new();
     if bytes.starts_with(&[0x1f, 0x8b]) {
@@ -58,7 +58,7 @@ fn layers(bytes: Vec<u8>) -> Vec<Vec<u8>> {
     layers
 }
 
-/// Pixels and nothing else: a chunk of text could hide what it says behind compression.
+/// Asserts that a PNG contains only pixels: a text chunk could hide its content by compression.
 fn assert_plain_png(bytes: &[u8]) {
     let mut at = 8;
     while at < bytes.len() {
@@ -75,7 +75,7 @@ fn assert_plain_png(bytes: &[u8]) {
     }
 }
 
-/// All files below a folder, hidden ones too.
+/// All files below a folder, including hidden ones.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap();
     let paths = entries.map(|entry| entry.unwrap().path());
@@ -105,7 +105,7 @@ fn assert_clean(folder: &Path) -> usize {
 #[test]
 fn no_output_identifies_the_source() {
     let root = tempfile::tempdir().unwrap();
-    // What a user keeps to himself, under names that reveal as much as the headers do.
+    // Private files of a user, whose names reveal as much as the headers.
     let private = root.path().join(format!("{WORD}-{}", DATES[1]));
     let (scan, out) = (private.join("scan"), root.path().join("out"));
     fs::create_dir_all(&scan).unwrap();
@@ -162,7 +162,7 @@ fn no_output_identifies_the_source() {
         assert_page_of_dataset_clean(&out, &scan);
     }
 
-    // What a command prints may name the file it writes, no other.
+    // The output of a command may name the file it writes, but no other.
     for path in [&case, &plan.display().to_string()] {
         said = said.replace(path.as_str(), "");
     }
@@ -171,12 +171,12 @@ fn no_output_identifies_the_source() {
     assert!(images > 2 * (2 * 5 + 2), "{images} files in the dataset");
     assert!(assert_clean(&out) > images + 8);
 
-    // The case is a working file: the place of the scan, and nothing else.
+    // The case is a working file: it may contain the path of the scan, and nothing else.
     let case = fs::read_to_string(case).unwrap();
     assert_eq!(leak(case.replace(&scan, "").as_bytes()), None, "in: {case}");
 }
 
-/// All that the page of a case gets from the program, which may name the files that were opened, no other.
+/// Everything that the program sends to the page of a case; it may name only the files that were opened.
 #[cfg(feature = "studio")]
 fn assert_page_clean(folder: &Path, case: &str, scan: &str) {
     let served = crate::studio::Served::start(folder, case);
@@ -195,7 +195,7 @@ fn assert_page_clean(folder: &Path, case: &str, scan: &str) {
     assert_answers_clean(&answers, &[scan, &private]);
 }
 
-/// Nothing is in the answers but the files that were opened.
+/// The answers name nothing except the files that were opened.
 #[cfg(feature = "studio")]
 fn assert_answers_clean(answers: &[Vec<u8>], opened: &[&str]) {
     for answer in answers {
@@ -208,7 +208,7 @@ fn assert_answers_clean(answers: &[Vec<u8>], opened: &[&str]) {
     }
 }
 
-/// The same of a plan, whose dataset is made and shown.
+/// The same for a plan, whose dataset is made and shown.
 #[cfg(feature = "studio")]
 fn assert_page_of_plan_clean(folder: &Path, plan: &Path, scan: &str) {
     let served = crate::studio::Served::start(folder, &plan.display().to_string());
@@ -230,7 +230,7 @@ fn assert_page_of_plan_clean(folder: &Path, plan: &Path, scan: &str) {
     assert_answers_clean(&answers, &[scan, &private]);
 }
 
-/// The same of a dataset.
+/// The same for a dataset.
 #[cfg(feature = "studio")]
 fn assert_page_of_dataset_clean(folder: &Path, scan: &str) {
     let served = crate::studio::Served::start(folder, "dataset");
@@ -244,7 +244,7 @@ fn assert_page_of_dataset_clean(folder: &Path, scan: &str) {
     assert_answers_clean(&answers, &[scan]);
 }
 
-/// The search sees through each wrapping that an output might have.
+/// The search finds words in every wrapping that an output might use.
 #[test]
 fn the_search_finds_what_is_hidden() {
     let wide = WORD

@@ -1,4 +1,4 @@
-//! Ctrl-C and TERM: the next whole step, one line that says how to resume, and the exit status of the signal.
+//! Ctrl-C and TERM: the current step is finished, one line says how to resume, and the exit status is that of the signal.
 #![cfg(target_os = "linux")] // which signals a run handles is read from /proc
 
 use std::fs;
@@ -26,7 +26,7 @@ fn send(run: &Child, signal: &str) {
     assert!(sent.unwrap().success());
 }
 
-/// Waits for the end of a run; its exit status and what it said on stderr. It must have printed no result.
+/// Waits for the end of a run and returns its exit status and stderr. It must have printed no result.
 fn ended(run: Child) -> (Option<i32>, String) {
     let output = run.wait_with_output().unwrap();
     assert!(output.stdout.is_empty(), "{output:?}");
@@ -43,7 +43,7 @@ fn wait_for(run: &mut Child, mut what: impl FnMut() -> bool) {
     }
 }
 
-/// A plan in the folder, and the command that simulates a radiograph of it with the analog engine.
+/// Writes a plan and returns the command that simulates its radiograph with the analog engine.
 fn analog_run(folder: &Path) -> String {
     write_plan(folder, "");
     let case = phantom().join("p01.toml");
@@ -53,7 +53,7 @@ fn analog_run(folder: &Path) -> String {
     )
 }
 
-/// Whether the program handles a signal by now.
+/// Whether the program already handles a signal.
 fn handles_signal(run: u32, signal: &str) -> bool {
     let status = fs::read_to_string(format!("/proc/{run}/status")).unwrap();
     let caught = status.split("SigCgt:").nth(1).unwrap();
@@ -62,7 +62,7 @@ fn handles_signal(run: u32, signal: &str) -> bool {
     caught >> (number - 1) & 1 == 1
 }
 
-/// Sends a signal a second after the program handles it; exit status and stderr.
+/// Sends a signal a second after the program handles it; returns exit status and stderr.
 fn interrupted(folder: &Path, arguments: &str, signal: &str) -> (Option<i32>, String) {
     let mut run = start(folder, arguments);
     let id = run.id();
@@ -113,7 +113,7 @@ fn a_stopped_pose_resumes_from_its_histories() {
         let mut command = ppa(here, &format!("{run} {out}"));
         command.env("TMPDIR", here);
         let mut stopped = spawn(command);
-        // The radiograph follows the depth images, which an archive's run makes in a folder of TMPDIR.
+        // The radiograph follows the depth images, which a run into an archive makes in a folder of TMPDIR.
         let image = ".ppa/new/patient_3/depth/r/orig/depth_cam_right_0.0.png";
         let is_made = |name: &String| here.join(name).join(image).exists();
         wait_for(&mut stopped, || names(here).iter().any(is_made));
@@ -145,7 +145,7 @@ fn a_second_ctrl_c_ends_at_once() {
     assert_ne!(endless, text);
     fs::write(&plan, endless).unwrap();
     let mut run = start(here, "generate plan.toml --out data --progress quiet");
-    // The folder of its images shows that a pose is under way; before that the first Ctrl-C would end the run.
+    // The folder of its images shows that a pose has started; before that the first Ctrl-C would end the run.
     wait_for(&mut run, || here.join("data/.ppa/new/patient_3").exists());
     send(&run, "INT");
     std::thread::sleep(Duration::from_millis(500));
@@ -170,7 +170,7 @@ fn histories_of_a_stopped_run_are_kept_without_tally() {
     contains(&said, &["histories, which are kept in x.png.tally", more]);
     assert_eq!(names(here), ["plan.toml", "x.png.tally"]);
 
-    // Begun again they would be lost.
+    // Starting again would lose them.
     let again = ppa(here, &endless).output().unwrap();
     let again = String::from_utf8(again.stderr).unwrap();
     contains(&again, &["x.png.tally", "--resume", "--replace"]);

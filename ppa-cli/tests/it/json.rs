@@ -46,7 +46,7 @@ fn every_command_keeps_its_keys() {
         "warnings",
     ];
     let original = object("ct info p01.nii", &info);
-    // NIfTI holds places as f32, the chain continues from there.
+    // NIfTI stores positions as f32, from which the chain continues.
     for copy in ["copy.nii.gz", "copy.nrrd", "copy.mha", "copy.mhd"] {
         let copied = object(&format!("ct convert p01.nii {copy}"), &info);
         assert_eq!(copied["modality"], Value::Null);
@@ -57,7 +57,7 @@ fn every_command_keeps_its_keys() {
     let dicom = object("ct convert copy.mhd copy", &info);
     assert_eq!(dicom["modality"], "CT");
     assert_eq!(dicom["size"], original["size"]);
-    // The phantom's values are no whole numbers: 2.8e3 HU in 65535 levels.
+    // The phantom's values are not integers: 2.8e3 HU in 65535 levels.
     for key in ["hu_min", "hu_max"] {
         let [a, b] = [&dicom, &original].map(|info| info[key].as_f64().unwrap());
         assert!((a - b).abs() < 0.05, "{key} of DICOM: {a}, {b}");
@@ -129,7 +129,7 @@ fn every_command_keeps_its_keys() {
         &augmented,
     );
     assert!((bigger["most_shift_mm"].as_f64().unwrap() - 2.0).abs() < 1e-3);
-    // A dent of 3 mm where the centre of the joint comes nearest to the skin.
+    // A dent of 3 mm where the joint centre is nearest to the skin.
     let joint = fs::read_to_string(folder.join("p01.toml")).unwrap();
     let joint = joint
         .lines()
@@ -139,7 +139,7 @@ fn every_command_keeps_its_keys() {
     let dent = format!("mesh augment p01.toml --bump {joint},-3,9 --out dent.ply");
     let dented = object(&dent, &augmented);
     let change = dented["volume_change_mm3"].as_f64().unwrap();
-    // 2 pi sigma² h over a plane.
+    // 2 pi sigma² h for a plane.
     assert!((-1.5..-0.5).contains(&(change / 1527.0)), "{change}");
     assert!((dented["most_shift_mm"].as_f64().unwrap() - 3.0).abs() < 0.3);
     object(
@@ -224,7 +224,7 @@ fn every_command_keeps_its_keys() {
     let [index, target, deviation] = indices.map(|key| exposed[key].as_f64().unwrap());
     assert_eq!(target, 400.0);
     assert!((deviation - 10.0 * (index / 400.0).log10()).abs() < 1e-9);
-    // The exposure index of automatic exposure control is the target; half the tube load gives half of it.
+    // With automatic exposure control the exposure index is the target; half the tube load gives half of it.
     let controlled = object("xray simulate p01.toml --out z.png --aec 300", &indices);
     let deviation = controlled["deviation_index"].as_f64().unwrap();
     assert!(deviation.abs() < 0.1, "{controlled}");

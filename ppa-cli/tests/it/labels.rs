@@ -1,10 +1,10 @@
-//! Labels: how far readers agree.
+//! Labels: agreement of readers.
 
 use std::fs;
 
 use crate::{fail, succeed};
 
-/// Grades of four readers for eight images; reader `d` saw two of them again. Expected: `pingouin` 0.7.0 (intraclass
+/// Grades of four readers for eight images; reader `d` saw two of them twice. Expected: `pingouin` 0.7.0 (intraclass
 /// correlation), `krippendorff` 0.8 (alpha), scikit-learn 1.9.1 (kappa).
 #[test]
 fn agreement_of_readers_from_their_files() {

@@ -1,4 +1,4 @@
-//! The program as a user meets it.
+//! Tests of the program as a user runs it.
 
 mod archives;
 mod auto_labels;
@@ -55,7 +55,7 @@ fn ppa(folder: &Path, arguments: &str) -> Command {
     command
         .current_dir(folder)
         .args(arguments.split_whitespace())
-        // Nothing is kept outside the folder: no folder can be made there.
+        // Nothing is stored outside the folder: no folder can be made there.
         .env("XDG_STATE_HOME", "/dev/null");
     command
 }
@@ -80,7 +80,7 @@ fn fail(folder: &Path, arguments: &str) -> String {
     stderr
 }
 
-/// Whether a message shows a value as Rust's `{:?}` does: an option, a struct, or a list of numbers with decimals.
+/// Whether a message shows a value in Rust's `{:?}` form: an option, a struct, or a list of numbers with decimals.
 fn shows_debug(message: &str) -> bool {
     let is_type = |word: &str| {
         word.starts_with(|c: char| c.is_ascii_uppercase())
@@ -110,7 +110,7 @@ fn debug_values_are_told_from_text() {
     }
 }
 
-/// Asserts that all parts stand in a text.
+/// Asserts that a text contains all parts.
 fn contains(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "{part:?} is missing in: {text}");
@@ -163,14 +163,14 @@ fn phantom() -> &'static Path {
     folder.path()
 }
 
-/// Radiographs that take no time: few pixels of few voxels.
+/// Fast radiographs: few pixels and few voxels.
 const QUICK_XRAY: &str = "[xray]\nhalf_length_mm = 20.0\nmax_voxel_mm = 5.0\n\
     detector = { columns = 8, rows = 8, pixel_mm = 25.0 }\n\
     engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1, \
     compton_model = \"incoherent_function\" }\n";
 
-/// Depth images that take no time: few pixels of cameras where the built-in ones are. A run renders the empty room once, which
-/// takes the built-in cameras longer than all else of a run that finds its poses made.
+/// Fast depth images: few pixels, with cameras at the built-in positions. A run renders the empty room once, which with the
+/// built-in cameras takes longer than everything else in a run over finished poses.
 const QUICK_DEPTH: &str = "[depth.cameras.left]\n\
     camera = { model = \"pinhole\", width = 80, height = 72, fx = 63.0, fy = 63.0, cx = 39.5, cy = 35.5 }\n\
     device_from_camera = [[0.9757162520935707, 0.0, 0.2190383423066972, -220.0], [0.0, 1.0, 0.0, 0.0], \
@@ -193,7 +193,7 @@ fn write_plan(folder: &Path, more: &str) -> PathBuf {
     path
 }
 
-/// The folder of shared test data beside the project.
+/// The folder of shared test data next to the project.
 fn shared() -> PathBuf {
     match std::env::var_os("PPA_SHARED") {
         Some(folder) => folder.into(),

@@ -1,4 +1,4 @@
-//! `ppa xray mcgpu`: keys, files and mistakes.
+//! `ppa xray mcgpu`: keys, files and errors.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::{contents, fail, names, succeed};
 
-/// A water box before a small detector, two projections, doses.
+/// Writes a water box in front of a small detector, with two projections and doses.
 pub fn write_input(folder: &Path) {
     let header =
         "[SECTION VOXELS HEADER v.2008-04-13]\n4 4 4\n1 1 1\n1\n2\n0\n[END OF VXH SECTION]\n";
@@ -35,7 +35,7 @@ pub fn write_input(folder: &Path) {
 fn result_has_its_keys_and_equal_seeds_give_equal_bytes() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
-    // Paths resolve against the input file, not against the folder of the call.
+    // Paths are relative to the input file, not to the current folder.
     let elsewhere = tempfile::tempdir().unwrap();
     let run = |out: &str, more: &str| -> Value {
         let input = folder.path().join("box.in");
@@ -82,7 +82,7 @@ fn result_has_its_keys_and_equal_seeds_give_equal_bytes() {
     }
 }
 
-/// An input in `folder`, and in `folder/images` its scan, interrupted in the second projection.
+/// Writes an input in `folder`, and in `folder/images` its scan, interrupted in the second projection.
 fn write_interrupted(folder: &Path) {
     write_input(folder);
     let out = folder.join("images");
@@ -156,7 +156,7 @@ fn a_scan_of_another_input_is_not_resumed() {
         refused(RESUME);
         fs::write(&path, text).unwrap();
     }
-    // A comment changes nothing; a folder may be named in another way.
+    // A comment changes nothing, nor does another path to the same folder.
     let input = fs::read_to_string(here.join("box.in")).unwrap();
     fs::write(here.join("box.in"), input + "# a comment\n").unwrap();
     succeed(here, &RESUME.replace("box.in", "./box.in"));
@@ -195,7 +195,7 @@ fn images_of_others_are_kept_when_a_scan_resumes() {
             None => fs::remove_file(&path).unwrap(),
         }
     }
-    // A complete image that is lost is simulated again, without counting its dose twice.
+    // A lost complete image is simulated again without counting its dose twice.
     fs::remove_file(images.join("image.dat_0000")).unwrap();
     succeed(here, RESUME);
     succeed(here, &RESUME.replace("images", "whole"));
@@ -237,7 +237,7 @@ fn images_of_the_fast_engine_are_kept_as_well() {
     fs::create_dir(&images).unwrap();
     let mut scan = Scan::new(&simulation, length, Engine::Fast, &images);
     let station = &simulation.input().stations()[0];
-    // Any image will do to see that it is kept.
+    // Any image is enough to check that it is kept.
     let (image, _) = simulation
         .analog(station, length, |_| ControlFlow::Continue(()))
         .unwrap();
@@ -292,7 +292,7 @@ fn mistakes_are_reported_and_leave_nothing_behind() {
     }
     let nowhere = "xray mcgpu nowhere.in --out results";
     assert!(fail(folder.path(), nowhere).contains("nowhere.in"));
-    // A folder that was there stays.
+    // An existing folder is kept.
     fs::create_dir(folder.path().join("mine")).unwrap();
     fail(folder.path(), "xray mcgpu bad.in --out mine");
     assert!(names(&folder.path().join("mine")).is_empty());

@@ -1,4 +1,4 @@
-//! Networks as files for other programs, from folders of trainings and from weight files.
+//! Networks exported for other programs, from folders of training runs and from weight files.
 
 use std::fs;
 
@@ -25,7 +25,7 @@ fn pairs_are_exported_from_trainings_and_weight_files() {
         }
         let weights = format!("{name}.safetensors");
         export(what, &weights);
-        // The names in the file show that there are two networks.
+        // The names in the file show that it contains two networks.
         assert!(export(&weights, "again.onnx") == model, "{what}");
         assert!(export(&weights, "again.safetensors") == fs::read(folder.join(&weights)).unwrap());
     }

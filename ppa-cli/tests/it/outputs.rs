@@ -1,12 +1,12 @@
-//! Outputs are tried before any work, and what is there is kept without `--replace`.
+//! Outputs are checked before any work, and existing ones are kept without `--replace`.
 //!
-//! The inputs named here do not exist: an error that names an output was found before any input was read.
+//! The inputs named here do not exist: an error that names an output was raised before any input was read.
 
 use std::fs;
 
 use crate::{contains, contents, fail, phantom, succeed};
 
-/// Commands and the one output of each that is there already.
+/// Commands, each with its one output that already exists.
 const OUTPUTS: &[(&str, &str)] = &[
     ("ct convert nowhere x.nii", "x.nii"),
     ("ct info nowhere --report x.html", "x.html"),
@@ -76,7 +76,7 @@ fn an_existing_file_is_refused_before_any_work() {
         let here = folder.path();
         fs::write(here.join(name), "kept").unwrap();
         contains(&fail(here, command), &[name, "--replace"]);
-        // Asked for: the missing input is the next thing that is wrong, and costs the old file nothing.
+        // With `--replace` the missing input is the next error, and the old file is kept.
         let said = fail(here, &format!("{command} --replace"));
         assert!(!said.contains("--replace"), "{command}: {said}");
         let kept = contents(here);
@@ -135,7 +135,7 @@ fn a_missing_folder_is_reported_before_any_work() {
     ] {
         contains(&fail(here, command), &["the folder no does not exist"]);
     }
-    // A file where a folder should be.
+    // A file in the place of a folder.
     fs::write(here.join("no"), "a file").unwrap();
     for command in [
         "prepare nowhere --side r --out no/a.toml",
@@ -164,7 +164,7 @@ fn an_edited_case_is_replaced_on_request_only() {
     fs::write(&path, &edited).unwrap();
     contains(&fail(here, &prepare), &["leg.case.toml exists"]);
     assert_eq!(fs::read_to_string(&path).unwrap(), edited);
-    // A replacement that fails leaves the old file.
+    // A failed replacement keeps the old file.
     let said = fail(here, &format!("{prepare} --replace --joint 9000,0,0"));
     assert!(!said.is_empty());
     assert_eq!(fs::read_to_string(&path).unwrap(), edited);

@@ -54,7 +54,7 @@ fn plate_labels_and_noise_are_in_the_files() {
     let [metal, bone] =
         ["metal.nii", "whole.nii"].map(|file| info(file)["hu_max"].as_f64().unwrap());
     assert!(metal > bone + 300.0, "{metal} and {bone}");
-    // Noise in air.
+    // Noise in the air.
     assert!(info("metal.nii")["hu_min"].as_f64().unwrap() < -1020.0);
     assert_eq!(info("whole.nii")["hu_min"], -1000.0);
 }

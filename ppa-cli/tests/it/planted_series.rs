@@ -1,5 +1,4 @@
-//! A DICOM series of the phantom whose every attribute about a person, a place, a date or an
-//! instance holds something that can be searched for.
+//! A DICOM series of the phantom in which every attribute about a person, a place, a date or an instance contains a searchable value.
 
 use std::path::Path;
 
@@ -9,11 +8,11 @@ use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 use ppa_phantom::{LowerLeg, TableTop};
 
-/// Stands in every planted text, and in the names of files and folders.
+/// Part of every planted text, and of the names of files and folders.
 pub const WORD: &str = "Zwetschgenkern";
 /// Start of every planted UID.
 pub const UID_ROOT: &str = "1.2.826.0.1.3680043.31415926";
-/// Planted dates and times, as DICOM writes them and as people do.
+/// Planted dates and times, in DICOM and in common notation.
 pub const DATES: [&str; 4] = ["19370519", "1937-05-19", "20240229", "031459.265358"];
 
 const TEXTS: [(Tag, VR); 24] = [
@@ -85,7 +84,7 @@ fn identity() -> InMemDicomObject {
     {
         object.put(text(tag, VR::UI, uid(n)));
     }
-    // A private block, and an order inside a sequence.
+    // A private block, and an order in a sequence.
     object.put(text(Tag(0x0009, 0x0010), VR::LO, format!("{WORD} CREATOR")));
     object.put(text(Tag(0x0009, 0x1001), VR::LO, format!("{WORD} private")));
     let mut item = InMemDicomObject::new_empty();

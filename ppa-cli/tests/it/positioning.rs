@@ -1,4 +1,4 @@
-//! Plans whose limbs are tilted or lie beside the central beam.
+//! Plans whose limbs are tilted or off the central beam.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use ppa_depth::DepthImage;
 
 use crate::{contains, fail, phantom, succeed, write_plan};
 
-/// With a short piece of limb in the voxels, it lies in the middle of the image, wherever the beam meets the limb.
+/// With a short piece of limb in the voxels, that piece is in the middle of the image, wherever the beam meets the limb.
 #[test]
 fn voxels_are_those_around_a_shifted_beam() {
     let folder = tempfile::tempdir().unwrap();
@@ -29,7 +29,7 @@ fn voxels_are_those_around_a_shifted_beam() {
         );
         let image = DepthImage::read_png(&folder.join("x.png")).unwrap();
         let row = |y: usize| image.z_mm[9 * y..][..9].iter().sum::<f32>();
-        // The bare field is black.
+        // The unattenuated field is black.
         let [head, middle, feet] = [row(1), row(10), row(19)];
         assert!(
             middle > 1000.0 && head < 0.05 * middle && feet < 0.05 * middle,

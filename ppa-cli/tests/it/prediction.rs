@@ -14,8 +14,8 @@ use crate::{contains, fail, ppa, succeed};
 
 const REGIONS: &str = "--roi-left 1,2,45 --roi-right 1,2,45";
 
-/// A folder with data and networks of the left camera, the right one, each of both, and pairs of both, after a step each; left limbs
-/// as they are, and in `mirrored_pairs` and the like as right ones.
+/// A folder with data and networks of the left camera, the right camera, both as single views, and pairs, each after one step; those
+/// named `mirrored_` see left limbs mirrored to right ones.
 pub fn trained() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -28,7 +28,8 @@ pub fn trained() -> &'static Path {
                 (views.to_owned(), false),
                 (format!("mirrored_{views}"), true),
             ] {
-                // From torchvision's first values and with statistics of the training images, outputs follow images after a step.
+                // With the initial values of torchvision and statistics of the training images, outputs depend on the images
+                // after one step.
                 let text = format!("views = {views:?}\nmirror = {mirror}\nrecompute_statistics = 4\nnetwork.last_layer = \"torchvision\"\n{config}");
                 fs::write(folder.path().join(format!("{run}.toml")), text).unwrap();
                 succeed(folder.path(), &format!("train {run}.toml --out {run}"));
@@ -39,7 +40,7 @@ pub fn trained() -> &'static Path {
     folder.path()
 }
 
-/// Runs a command with some input; its lines of JSON and what stands on stderr.
+/// Runs a command with `input`; returns its lines of JSON and its stderr.
 fn answers(mut command: Command, input: impl AsRef<[u8]>) -> (Vec<Value>, String) {
     let pipes = command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut run = pipes.stderr(Stdio::piped()).spawn().unwrap();
@@ -52,7 +53,7 @@ fn answers(mut command: Command, input: impl AsRef<[u8]>) -> (Vec<Value>, String
     (lines.collect(), stderr)
 }
 
-/// What `ppa eval` says of each image of person 1.
+/// Output of `ppa eval` for each image of person 1.
 fn evaluated(folder: &Path, run: &str) -> BTreeMap<String, f64> {
     succeed(folder, &format!("eval {run}"));
     let table = folder.join(run).join("evaluation/predictions.csv");
@@ -93,7 +94,7 @@ fn pairs_on_stdin_get_the_predictions_of_evaluation() {
         close("quality", (expected[0] + expected[1]) / 2.0);
         assert!(line["latency_ms"].as_f64().unwrap() > 0.0);
     }
-    // One network of both images.
+    // One network for both images.
     let (lines, _) = answers(
         ppa(folder, &format!("predict pairs {REGIONS} --stdin")),
         &input,
@@ -108,7 +109,7 @@ fn pairs_on_stdin_get_the_predictions_of_evaluation() {
         assert!((found - expected).abs() < 1e-5 * expected.abs(), "{line}");
         assert!(line.get("left").is_none());
     }
-    // A network of both views, whatever the number of threads.
+    // A network for either view, with any number of threads.
     let both = ["1", "2"].map(|threads| {
         let command = format!("predict unified {REGIONS} --stdin --threads {threads}");
         let (lines, _) = answers(ppa(folder, &command), &input);
@@ -119,7 +120,7 @@ fn pairs_on_stdin_get_the_predictions_of_evaluation() {
     assert_eq!(both[0], both[1]);
 }
 
-/// The frames show a left limb: the left camera's network sees the mirrored frame of the right camera, and the other way round.
+/// The frames show a left limb: the left camera's network sees the mirrored frame of the right camera, and vice versa.
 #[test]
 fn a_left_limb_is_mirrored_in_prediction_as_in_training() {
     let folder = trained();
@@ -146,11 +147,11 @@ fn a_left_limb_is_mirrored_in_prediction_as_in_training() {
     assert!(spread > 1e-3 * by_right[&left].abs(), "{line}");
     let line = predict("mirrored_pairs --side l");
     near(&line["quality"], joint[&right]);
-    // Frames of a right limb are seen as they are.
+    // Frames of a right limb are not mirrored.
     let other = predict("mirrored_pairs --side r")["quality"].as_f64();
     let spread = (other.unwrap() - joint[&right]).abs();
     assert!(spread > 1e-3 * joint[&right].abs(), "{line}");
-    // Networks that show limbs as they are do not ask.
+    // Networks trained without mirroring ignore the side.
     assert_eq!(
         predict("pairs --side l")["quality"],
         predict("pairs")["quality"]
@@ -177,7 +178,7 @@ fn a_left_limb_is_mirrored_in_prediction_as_in_training() {
         &fail(folder, "learn export left mirrored_right --out mixed.onnx"),
         &["was trained with mirror = true, the other was not"],
     );
-    // What an exported network needs to know is in the file.
+    // An exported file contains all that its network needs to know.
     for name in ["mirrored.onnx", "mirrored.safetensors"] {
         succeed(folder, &format!("learn export mirrored_left --out {name}"));
         let bytes = fs::read(folder.join(name)).unwrap();
@@ -232,7 +233,7 @@ fn frames_that_cannot_be_used_are_named_and_skipped() {
     contains(&fail(folder, &nowhere), &["nowhere"]);
 }
 
-/// A recorder that writes slowly; Ctrl-C ends with a summary.
+/// A slow recorder; Ctrl-C ends with a summary.
 #[cfg(unix)]
 #[test]
 fn a_folder_is_watched_until_ctrl_c() {

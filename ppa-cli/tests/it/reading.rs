@@ -1,4 +1,4 @@
-//! `--series`, `--fill-gaps` and `--force`: what they let pass, and cases that remember them.
+//! `--series`, `--fill-gaps` and `--force`: what they accept, and cases that record them.
 
 use std::fs;
 use std::path::Path;
@@ -48,7 +48,7 @@ fn codes(report: &Value) -> Vec<&str> {
     warnings.map(|w| w["code"].as_str().unwrap()).collect()
 }
 
-/// Prepares with an option, and uses the case with it and without the line that remembers it.
+/// Prepares with an option, then uses the case with and without the line that records it.
 fn assert_remembered(folder: &Path, option: &str, line: &str, refusal: &str) {
     let said = fail(folder, "prepare scan --side r --out case.toml");
     assert!(said.contains(refusal), "{said}");
@@ -104,7 +104,7 @@ fn gaps_are_filled_only_when_asked_for() {
     assert!(fail(folder, "xray audit scan").contains("9.000 mm after slice 9"));
     let audited = report(slices(), "xray audit slices");
     assert_eq!(voxels("xray audit scan --fill-gaps"), audited["voxels"]);
-    // The file cannot show; what is printed does.
+    // The file cannot show filled gaps; the printed report does.
     let converted = report(folder, "ct convert scan out.nrrd --fill-gaps");
     assert_eq!(codes(&converted), ["gaps-filled"]);
     assert_remembered(
@@ -126,7 +126,7 @@ fn one_of_several_series_is_chosen_by_number_or_uid() {
         &[
             (tags::SERIES_INSTANCE_UID, VR::UI, "2.25.4711"),
             (tags::SERIES_NUMBER, VR::IS, "7"),
-            // Told apart by their values: one HU more.
+            // Distinguished by their values: one HU more.
             (tags::RESCALE_INTERCEPT, VR::DS, "1001.5"),
         ],
     );
@@ -154,7 +154,7 @@ fn one_of_several_series_is_chosen_by_number_or_uid() {
     assert_remembered(folder, "--series 1", "series = 1", "2 series");
 }
 
-/// A page of doses in colour that calls itself CT.
+/// A colour page of doses that claims to be CT.
 #[test]
 fn a_colour_page_beside_a_series_is_listed_with_reason() {
     let folder = tempfile::tempdir().unwrap();

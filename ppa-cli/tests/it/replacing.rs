@@ -1,4 +1,4 @@
-//! A finished dataset meets another plan, or a user who may only read it.
+//! A finished dataset with another plan, or with a user who has only read access.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::shards::{whole, write_quick_plan};
 use crate::{contents, fail, ppa, succeed};
 
-/// A folder with the quick plan, one with another tube voltage and the dataset `data` of the former.
+/// A folder with the quick plan, one with another tube voltage, and the dataset `data` of the first.
 fn two_plans() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_quick_plan(folder.path());
@@ -56,7 +56,7 @@ fn another_plan_changes_a_dataset_only_when_asked_to() {
     succeed(here, "generate other.toml --out fresh --progress quiet");
     assert!(contents(&here.join("data")) == contents(&here.join("fresh")));
 
-    // The same for a merge, which is killed again and again.
+    // The same for a merge that is killed repeatedly.
     succeed(
         here,
         "generate plan.toml --shard 1/1 --out data --replace --progress quiet",
@@ -69,8 +69,7 @@ fn another_plan_changes_a_dataset_only_when_asked_to() {
     killed_while_replacing(here);
 }
 
-/// Merges `data` over `fresh` and back, with kills between; each pose is that of one of them, or half replaced and known
-/// to be.
+/// Merges `data` over `fresh` and back, with kills in between; each pose belongs to one of the two, or is half replaced and marked as such.
 fn killed_while_replacing(here: &Path) {
     copy(&here.join("fresh"), &here.join("other"));
     let whole = ["data", "other"].map(|name| contents(&here.join(name)));
@@ -155,7 +154,7 @@ fn flipped_bits_are_found_by_the_program() {
     succeed(here, "dataset check data");
 }
 
-/// As another user who may only read, since to root nothing is forbidden.
+/// Runs as another user with read access only, since root may write everywhere.
 #[test]
 #[cfg(unix)]
 fn a_dataset_that_may_only_be_read_is_looked_at() {
@@ -191,7 +190,7 @@ fn a_dataset_that_may_only_be_read_is_looked_at() {
             },
         );
     }
-    // Its scan is that of other tests.
+    // Its scan is shared with other tests.
     for path in all_below(crate::phantom()) {
         allow(&path, if path.is_dir() { 0o755 } else { 0o644 });
     }

@@ -1,4 +1,4 @@
-//! A killed run resumes where it stopped, to the same bytes.
+//! A killed run resumes where it stopped, with the same bytes.
 
 use std::fs;
 use std::path::Path;
@@ -32,7 +32,7 @@ fn a_killed_run_resumes_to_the_same_dataset() {
         );
         std::thread::sleep(Duration::from_millis(5));
     }
-    run.kill().unwrap(); // SIGKILL: the program gets no chance to tidy up
+    run.kill().unwrap(); // SIGKILL: the program cannot clean up
     run.wait().unwrap();
     let before = records(&killed);
     assert!(!killed.join("manifest.jsonl").exists());

@@ -1,4 +1,4 @@
-//! `room.toml` and the frames that any program can check.
+//! `room.toml` and frames that any program can check.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn motion(frames: &Value, name: &str) -> Rows {
         .unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// The chain of motions as another program would multiply it.
+/// Product of the motions, as another program would compute it.
 fn chain(frames: &Value, names: &[&str]) -> Rows {
     let links = names.iter().map(|name| motion(frames, name));
     let product = |a: Rows, b: Rows| {
@@ -36,7 +36,7 @@ fn assert_meet(frames: &Value, a: &[&str], b: &[&str]) {
     }
 }
 
-/// What is written is what is read, and a change of it moves what it should.
+/// A written room file reads back unchanged, and changing it moves the right frames.
 #[test]
 fn a_room_file_says_where_everything_is() {
     let folder = tempfile::tempdir().unwrap();
@@ -64,14 +64,14 @@ fn a_room_file_says_where_everything_is() {
     );
     let far = frames(&at("c.json"));
     assert_eq!(far["source_detector_mm"], 1300.0);
-    // The detector stays where it is: the source and the cameras on it are 200 mm higher.
+    // The detector does not move: the source and the cameras on it are 200 mm higher.
     for name in ["room_from_device", "room_from_left", "room_from_right"] {
         let (near, far) = (motion(&frames(&at("a.json")), name), motion(&far, name));
         assert!((far[2][3] - near[2][3] - 200.0).abs() < 1e-9, "{name}");
     }
 }
 
-/// Every motion of a placed limb fits its neighbours.
+/// All motions of a placed limb are consistent.
 #[test]
 fn frames_of_a_placed_limb_meet() {
     let folder = tempfile::tempdir().unwrap();

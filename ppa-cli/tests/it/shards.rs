@@ -1,4 +1,4 @@
-//! Shards of a plan, merged to the bytes of one run; and what a plan takes.
+//! Shards of a plan, merged to the bytes of a single run; and the cost of a plan.
 
 use std::fs;
 use std::path::Path;
@@ -51,7 +51,7 @@ fn one_to_sixty_four_shards_merge_to_the_bytes_of_one_run() {
     merged_shards_are_one_run(&[(1, 1), (2, 2), (64, 1)]);
 }
 
-/// For each number of shards and of threads.
+/// Checks each pair of numbers of shards and threads.
 fn merged_shards_are_one_run(cases: &[(u32, u32)]) {
     let expected = contents(&whole().join("whole"));
     for &(count, threads) in cases {
@@ -115,7 +115,7 @@ fn overlaps_holes_and_strangers_are_refused() {
         &["s1 holds shard 1/2", "the whole plan"],
     );
 
-    // A damaged image stops the merge, which continues once the shard is made whole again.
+    // A damaged image stops the merge, which continues once the shard is repaired.
     let image = "patient_3/depth/r/orig/depth_cam_left_10.0.png";
     let bytes = fs::read(here.join("s2").join(image)).unwrap();
     fs::write(here.join("s2").join(image), &bytes[..bytes.len() / 2]).unwrap();
@@ -221,7 +221,7 @@ fn limbs_made_at_once_have_the_bytes_of_one_after_another() {
          [rotation]\nfrom_deg = 0.0\nto_deg = 10.0\nstep_deg = 10.0\n{QUICK_XRAY}{QUICK_DEPTH}"
     );
     fs::write(folder.join("plan.toml"), plan).unwrap();
-    // One limb at a time for every four threads.
+    // Limbs are made one at a time for every four threads.
     for threads in [1, 8] {
         succeed(
             folder,
@@ -282,7 +282,7 @@ fn a_plan_tells_what_it_takes_or_why_it_cannot_work() {
         (number("cpu_hours") / expected - 1.0).abs() < 1e-9,
         "{report}"
     );
-    // A short plan is one task, on two cores.
+    // A short plan is one task with two cores.
     let cluster = |key: &str| report["cluster"][key].as_f64().unwrap();
     assert_eq!((cluster("shards"), cluster("at_once")), (1.0, 1.0));
     let task_s = number("cpu_s_per_limb") + 2.5 * number("cpu_s_per_unit");

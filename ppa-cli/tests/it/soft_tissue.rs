@@ -1,4 +1,4 @@
-//! A dataset of limbs whose soft tissue the table flattens.
+//! A dataset of limbs with soft tissue flattened by the table.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::{succeed, write_plan};
 
-/// Rows of the manifest at the first angle, and the image of the left camera of the scan's own shape.
+/// Rows of the manifest at the first angle, and the left camera's image of the `orig` shape.
 fn generated(folder: &Path, more: &str) -> (Vec<Value>, DepthImage) {
     let few = "[shapes]\nvariants = [\"orig\", \"big\"]\n";
     write_plan(folder, &format!("{few}{more}"));
@@ -36,13 +36,13 @@ fn a_dataset_with_soft_tissue_lies_lower_and_is_recorded() {
     });
     assert_eq!(rigid.2["distal_mm"], 0.0);
     assert_eq!(soft.2["distal_mm"], 4.0);
-    // Both ends sink in by 4 mm and so does all that is not pressed against the table.
+    // Both ends sink by 4 mm, as does everything that is not pressed against the table.
     let height = |rows: &[Value]| rows[0]["room_from_patient"][2][3].as_f64().unwrap();
     assert!((height(&rigid.0) - height(&soft.0) - 4.0).abs() < 0.5);
     let lower = |(a, b): (&f32, &f32)| *a > 0.0 && *b > 0.0 && b - a > 2.0;
     let pairs = || rigid.1.z_mm.iter().zip(&soft.1.z_mm);
     assert!(pairs().filter(|pair| lower(*pair)).count() > 1000);
-    // The change of volume of a body shape stands in the manifest, for its images only.
+    // The manifest gives the volume change of a body shape, for its images only.
     for row in &rigid.0 {
         let change = row["volume_change_mm3"].as_f64();
         let of_big = row["kind"] == "depth" && row["shape"] == "big";

@@ -1,4 +1,4 @@
-//! `ppa studio` as a process: its address, its end, and what it refuses to open.
+//! `ppa studio` as a process: its address, its exit, and the files it refuses to open.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -52,7 +52,7 @@ impl Served {
         served
     }
 
-    /// The whole answer to a request, headers included.
+    /// The complete answer to a request, including headers.
     pub fn get(&self, path: &str) -> Vec<u8> {
         self.send(&format!("GET {path} HTTP/1.1\r\n"), "")
     }
@@ -77,7 +77,7 @@ impl Served {
         answer
     }
 
-    /// Sends Ctrl-C and waits; the exit status.
+    /// Sends Ctrl-C, waits and returns the exit status.
     pub fn stop(mut self) -> Option<i32> {
         let mut kill = Command::new("kill");
         kill.args(["-INT", &self.child.id().to_string()]);
@@ -119,10 +119,10 @@ fn a_killed_studio_starts_again_at_the_same_address() {
     first.child.wait().unwrap();
     let second = start();
     assert_eq!(first.host, second.host);
-    // The browser that has the first one's cookie is let in.
+    // A browser with the first one's cookie is let in.
     let state = String::from_utf8(first.get("/api/state")).unwrap();
     contains(&state, &["HTTP/1.1 200", "\"name\":\"p01.toml\""]);
-    // A second studio beside it is another one.
+    // A second studio at the same time has its own address.
     let beside = start();
     assert_ne!(beside.host, second.host);
     assert_ne!(beside.cookie, second.cookie);
@@ -178,7 +178,7 @@ fn the_mortise_of_the_built_in_phantom_faces_the_beam_at_18() {
             serde_json::from_value(json(room)["room_from_ct"].clone()).unwrap();
         (0..3).map(|i| rows[2][i] * mortise[i]).sum::<f64>()
     };
-    // P01's mortise view is at 18 degrees; the axis that is found and the foot's rest on the table tilt it a little.
+    // P01's mortise view is at 18 degrees; the detected axis and the foot's support on the table tilt it a little.
     assert!(up(18.0) > 6.0_f64.to_radians().cos(), "{}", up(18.0));
     assert!(up(0.0) < 12.0_f64.to_radians().cos(), "{}", up(0.0));
 }
@@ -308,7 +308,7 @@ fn a_dataset_of_the_page_is_that_of_the_command() {
         assert!(started.elapsed() < Duration::from_secs(300), "{state}");
         std::thread::sleep(Duration::from_millis(100));
     };
-    // The command that the page shows, into another folder.
+    // The command shown on the page, into another folder.
     let command = command.split('"').next().unwrap();
     succeed(folder, &command.replace("by_page", "by_command"));
     let expected = contents(&folder.join("by_command"));
@@ -349,7 +349,7 @@ fn grading_in_a_studio_uses_the_key_of_an_export() {
     let command = found.split(r#""import":"ppa "#).nth(1).unwrap();
     let command = command.split('"').next().unwrap();
     assert!(command.ends_with("/grades_*.csv"), "{command}");
-    // As a shell would write it out.
+    // With the pattern expanded as by a shell.
     succeed(here, &command.replace("grades_*.csv", "grades_ben.csv"));
     assert!(read("data/grades.csv").contains(",ben,1.5,"));
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::{fail, names, phantom, succeed, write_plan};
 
-/// An analog run of 20000 histories on the phantom with a small detector, and what it prints.
+/// Runs 20000 analog histories on the phantom with a small detector and returns the printed object.
 fn simulate(folder: &Path, more: &str) -> Value {
     serde_json::from_str(&succeed(folder, &command(more))).unwrap()
 }
@@ -50,7 +50,7 @@ fn parts_and_resumed_runs_end_in_the_bytes_of_one_run() {
             > report["detector_air_kerma_ugy_per_mas"].as_f64()
     );
 
-    // The fast engine states the same kerma, and that of its tube load.
+    // The fast engine states the same kerma per mAs, and that of its tube load.
     let case = phantom().join("p01.toml");
     let fast = format!(
         "xray simulate {} --plan plan.toml --mas 2 --out fast.png --json",
@@ -102,7 +102,7 @@ fn parts_and_resumed_runs_end_in_the_bytes_of_one_run() {
         "--histories 20000 --dose --tally go_on.tally --resume",
     );
     assert!(read(folder, "go_on.tally") == read(folder, "one.tally"));
-    // A finished run that is resumed has nothing to do and replaces its image by the same one.
+    // Resuming a finished run does nothing and replaces its image by the same one.
     for _ in 0..2 {
         simulate(
             folder,
@@ -122,8 +122,8 @@ fn parts_and_resumed_runs_end_in_the_bytes_of_one_run() {
     );
 }
 
-/// Where there is dose there is limb, and the mean over the map is some half of the air kerma at the skin: the beam fades on its
-/// way through, and the air in the map takes as much as the tissue.
+/// The dose is in the limb, and the mean over the map is about half of the air kerma at the skin: the beam is attenuated on
+/// its way, and the air in the map receives as much as the tissue.
 #[test]
 fn a_dose_map_lies_on_the_limb_in_the_units_of_the_kerma() {
     let folder = tempfile::tempdir().unwrap();

@@ -71,7 +71,7 @@ fn colours_follow_the_option_then_the_environment() {
     assert!(text.starts_with(b"ppa: ") && !escape(&text));
 }
 
-/// The object on stderr; there is nothing else, and no result.
+/// The object on stderr, which contains nothing else; stdout is empty.
 fn failure(arguments: &str) -> Value {
     let said = output(arguments, &[]);
     let stderr = String::from_utf8(said.stderr).unwrap();
@@ -149,7 +149,7 @@ fn every_command_has_a_manual_page() {
     );
     assert!(read("ppa.1").contains("ppa\\-generate(1)"));
 
-    // The same pages again are no loss, changed ones are kept.
+    // The same pages may be written again; changed ones are kept.
     succeed(folder.path(), "man --out pages");
     fs::write(folder.path().join("pages/ppa.1"), "mine").unwrap();
     assert!(fail(folder.path(), "man --out pages").contains("--replace"));

@@ -1,4 +1,4 @@
-//! Training and evaluation as a user meets them.
+//! Training and evaluation as a user runs them.
 
 use std::fs;
 use std::path::Path;
@@ -119,7 +119,7 @@ fn an_experiment_names_all_missing_data_before_it_trains() {
     let plan = "seeds = 2\n[training]\npreset = \"quick\"\n[synthetic]\ndataset = \"data\"\nfolds = 2\ntest_limbs = 1\n";
     fs::write(folder.join("plan.toml"), plan).unwrap();
     let said = fail(folder, "experiment 1 plan.toml --out runs");
-    // Without variants of the skin one column of four can be made, of each fold and view.
+    // Without variants of the skin, one of four columns can be made for each fold and view.
     assert!(
         said.contains("12 of 16 training runs of each seed"),
         "{said}"
@@ -156,7 +156,7 @@ fn an_experiment_makes_the_chosen_columns_only() {
         table.contains("INCOMPLETE: 6 test sets are missing"),
         "{table}"
     );
-    // All that the plan has data for: 1, and its variations.
+    // Everything for which the plan has data: experiment 1 and its variations.
     let all = "experiment all plan.toml --out runs --so-far --replace";
     let said = succeed(folder, &format!("{all} --json"));
     let said: serde_json::Value = serde_json::from_str(&said).unwrap();
@@ -200,7 +200,7 @@ fn bad_trainings_are_reported_in_one_sentence() {
     assert!(fail(folder, "eval run").contains("config.toml"));
 }
 
-/// Ctrl-C saves: no step is made twice.
+/// Ctrl-C saves the current step, so no step is repeated.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_training_saves_its_step() {
@@ -256,13 +256,13 @@ fn tables_are_marked_while_results_are_missing() {
     fs::write(folder.join("plan.toml"), plan).unwrap();
     let said = succeed(folder, "experiment 2a plan.toml --out runs --so-far --json");
     let said: serde_json::Value = serde_json::from_str(&said).unwrap();
-    // Without the column of ImageNet, for which the plan has no weights.
+    // Without the ImageNet column, for which the plan has no weights.
     assert_eq!(said["missing"], 9 * 2 * 2);
     assert_eq!(said["finished"], false);
     assert_eq!(said["permutation_test"], serde_json::Value::Null);
     let table = fs::read_to_string(folder.join("runs/experiment_2a.md")).unwrap();
     assert!(table.contains("INCOMPLETE: 36 test sets"), "{table}");
-    // A table that differs is kept; the same one is no other.
+    // A different table is kept; writing the same one again is allowed.
     succeed(folder, "experiment 2a plan.toml --out runs --so-far");
     fs::write(folder.join("runs/experiment_2a.md"), "notes").unwrap();
     for so_far in ["--so-far", ""] {

@@ -1,4 +1,4 @@
-//! What the cameras see of a case, a placed skin and a room.
+//! Camera views of a case, a placed skin and a room.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ fn depth(path: &Path) -> DepthImage {
     DepthImage::read_png(path).unwrap()
 }
 
-/// Largest difference of two images in mm where both see something, and how many pixels only one sees.
+/// Largest difference of two images in mm where both have a depth, and the number of pixels where only one has.
 fn differences(a: &DepthImage, b: &DepthImage) -> (f32, usize) {
     let pairs = || a.z_mm.iter().zip(&b.z_mm);
     let both = pairs().filter(|(a, b)| **a > 0.0 && **b > 0.0);
@@ -60,7 +60,7 @@ fn a_case_is_rendered_as_its_dataset_shows_it() {
     assert!(read("noisy_left.png") != read("d_left.png"));
 }
 
-/// A skin in the scan and one in the room, each with its motion from the frames, is what the case shows.
+/// A skin in the scan and one in the room, each with its motion from the frames, look the same as the case.
 #[test]
 fn frames_feed_the_renderer() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn a_room_that_was_written_renders_and_is_a_room_again() {
         image.valid_pixels() * 10 > 9 * image.z_mm.len(),
         "{printed}"
     );
-    // The camera stands 220 mm beside and 980 mm above the isocentre on the table, at which it looks.
+    // The camera is 220 mm beside and 980 mm above the isocentre on the table, at which it looks.
     let middle = image.z_mm[(image.height / 2 * image.width + image.width / 2) as usize];
     assert!((middle - 220_f32.hypot(980.0)).abs() < 4.0, "{middle}");
     // From the origin, on the table, the camera looks up at the collimator.

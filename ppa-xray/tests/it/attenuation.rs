@@ -9,7 +9,7 @@ use crate::shared;
 
 /// NIST tables of Hubbell and Seltzer (NISTIR 5632), total with coherent scattering, cm²/g.
 ///
-/// Those data are not the EPDL97 of this crate: they differ by up to 2 % where the photoelectric effect rules.
+/// These data are not the EPDL97 of this crate: they differ by up to 2 % where the photoelectric effect dominates.
 #[test]
 fn totals_agree_with_the_nist_tables() {
     for (name, energy_kev, nist) in [
@@ -36,7 +36,7 @@ fn totals_agree_with_the_nist_tables() {
     }
 }
 
-/// The straight lines of the transport tables, on both sides of every edge and between.
+/// Checks the piecewise linear transport tables on both sides of every edge and between edges.
 #[test]
 fn tables_for_transport_follow_the_material() {
     for name in [
@@ -50,7 +50,7 @@ fn tables_for_transport_follow_the_material() {
     ] {
         let material = Material::named(name).unwrap();
         let tables = MaterialTables::new(&material, ComptonModel::default());
-        // K edges of Ti, I, Cs, Gd, Pb and U as xraylib's cross sections have them.
+        // K edges of Ti, I, Cs, Gd, Pb and U in xraylib's cross sections.
         let edges = [4.96600, 33.16996, 35.98653, 50.23664, 88.00069, 115.60101];
         let beside = edges
             .iter()

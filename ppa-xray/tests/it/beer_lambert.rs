@@ -1,4 +1,4 @@
-//! Photons that pass without interaction, against exp(−μ × chord).
+//! Photons transmitted without interaction, compared with exp(−μ × chord).
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_ct::Grid;
@@ -25,8 +25,8 @@ fn simulate(phantom: &VoxelPhantom, projection: &Projection, histories: u64) -> 
     analog(phantom, &spectrum, projection, &settings).unwrap()
 }
 
-/// χ² of groups of pixels against what they should read together, in standard deviations of χ². Groups, because noise
-/// would hide an error that all pixels share.
+/// Deviation of χ² from its mean, in standard deviations of χ², for sums over groups of pixels. Single pixels would hide a
+/// common error in their noise.
 fn chi2_deviation(
     image: &Radiograph,
     expected: &[(usize, f64)],
@@ -40,7 +40,7 @@ fn chi2_deviation(
         sums.1 += expected;
     }
     let area_cm2 = image.detector.pixel_mm.powi(2) / 100.0;
-    // The variance of a number of photons of one energy follows from the expected reading.
+    // For photons of one energy the variance follows from the expected reading.
     let quantum = 1e3 * ENERGY_KEV / area_cm2 / image.histories;
     let chi2: f64 = groups
         .values()
@@ -50,7 +50,7 @@ fn chi2_deviation(
     (chi2 - n) / (2.0 * n).sqrt()
 }
 
-/// A staircase of water in vacuum: ten steps of 10 mm, seen from 10 m.
+/// A staircase of water in vacuum: ten steps of 10 mm, source at 10 m.
 #[test]
 fn each_step_of_a_wedge_attenuates_by_its_thickness() {
     let spacing = Vector3::new(20.0, 200.0, 10.0);
@@ -64,7 +64,7 @@ fn each_step_of_a_wedge_attenuates_by_its_thickness() {
     let water = Material::named("water").unwrap();
     let phantom = VoxelPhantom::new(grid, vec![0; 100], density, vec![water]).unwrap();
     let pose = Isometry3::translation(0.0, 0.0, -10_000.0);
-    // Five pixels per step; the outer two of each see its edges.
+    // Five pixels per step; the outer two of each step include its edges.
     let projection = Projection::new(pose, 10_050.0, Detector::centred(50, 40, 4.0));
     let image = simulate(&phantom, &projection, 3_000_000);
     let mu = water_mu_per_mm();
@@ -79,14 +79,14 @@ fn each_step_of_a_wedge_attenuates_by_its_thickness() {
         })
         .collect();
     let deviation = chi2_deviation(&image, &expected, |pixel| pixel % 50 / 5);
-    // False alarm for another seed: 8e-4. One percent more attenuation makes it 17.
+    // False alarm for another seed: 8e-4. One percent more attenuation gives 17.
     assert!(
         deviation < 4.5,
         "χ² is {deviation:.1} standard deviations off"
     );
 }
 
-/// A cube that stands askew: chords from the planes of its faces.
+/// A tilted cube: chords from the planes of its faces.
 #[test]
 fn chords_of_a_tilted_cube_attenuate_by_their_length() {
     let tilt = UnitQuaternion::from_euler_angles(0.6, -0.4, 0.9);

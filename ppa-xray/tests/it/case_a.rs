@@ -40,7 +40,7 @@ fn phantom() -> VoxelPhantom {
     .unwrap()
 }
 
-/// Beam along ct y, columns along x; device y is then −z.
+/// Beam along ct y, columns along x; device y is therefore −z.
 fn projection() -> Projection {
     let axes = Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]);
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
@@ -60,7 +60,7 @@ fn reference() -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// Mean and standard error of a layer over a region of the reference, whose row z counts the other way.
+/// Mean and standard error of a layer over a region of the reference, where z counts in the opposite direction to the rows.
 fn region(image: &Radiograph, category: Category, bounds: &Value) -> (f64, f64) {
     let bound = |i: usize| bounds[i].as_u64().unwrap() as usize;
     let layer = image.layer(category);
@@ -76,10 +76,9 @@ fn region(image: &Radiograph, category: Category, bounds: &Value) -> (f64, f64) 
     (sum / pixels, variance.sqrt() / pixels)
 }
 
-/// Sums within the agreed tolerances, regions within 4.5 combined standard errors (20 comparisons:
-/// 1.4e-4 in all) plus the 0.5 % by which interpolation of the photon data may differ. Pixels of
-/// the fast engine share the error of the scatter, so their own errors do not add up to that of a region:
-/// then the ratio to the error of the reference, which ran 4e7 analog histories, is given.
+/// Sums agree within the agreed tolerances, regions within 4.5 combined standard errors (20 comparisons: 1.4e-4 in all) plus
+/// 0.5 % for the interpolation of the photon data. Pixels of the fast engine share the error of the scatter, so the error of
+/// a region does not follow from theirs: `se_to_reference` then gives its ratio to the error of the reference (4e7 analog histories).
 fn assert_agrees(image: &Radiograph, reference: &Value, se_to_reference: Option<f64>) {
     let mut total = 0.0;
     for (category, tolerance) in Category::ALL.into_iter().zip([0.01, 0.02, 0.03, 0.02]) {

@@ -1,4 +1,4 @@
-//! Dose and air kerma against answers that can be derived.
+//! Dose and air kerma against analytical results.
 
 use std::ops::ControlFlow;
 
@@ -28,7 +28,7 @@ fn dose(
     tally.dose().unwrap()
 }
 
-/// What is counted in three ways is the same energy, and masses are those of the voxels.
+/// Materials, voxels and regions add up to the same energy, and masses are those of the voxels.
 #[test]
 fn materials_voxels_and_regions_add_up() {
     let phantom = limb(&Isometry3::identity());
@@ -79,8 +79,8 @@ fn materials_voxels_and_regions_add_up() {
     assert!((gray * pin.1.mass_g / 1.602_176_634e-16 - 1.0).abs() < 1e-9);
 }
 
-/// Over 40 seeds the results scatter as their standard errors say. Squared deposit by deposit instead of history by
-/// history, those of the phantom would be far too small.
+/// Over 40 seeds the results scatter according to their standard errors. Squaring each deposit instead of each history would
+/// give far too small an error for the phantom.
 #[test]
 fn standard_errors_are_those_of_whole_histories() {
     let grid = Grid::axis_aligned(
@@ -122,7 +122,7 @@ fn standard_errors_are_those_of_whole_histories() {
             .sum::<f64>();
         let stated = results.iter().map(|dose| of(dose).1.powi(2)).sum::<f64>() / n;
         let chi2 = scatter / stated;
-        // 39 degrees of freedom: 1e-4 outside on either side.
+        // 39 degrees of freedom: probability 1e-4 on either side.
         assert!((13.0..83.0).contains(&chi2), "{what}: χ² = {chi2:.1}");
     };
     let of = |estimate: ppa_xray::Estimate| (estimate.value, estimate.se);
@@ -142,8 +142,8 @@ fn standard_errors_are_those_of_whole_histories() {
     }
 }
 
-/// With nothing in the beam the kerma on the detector is that of the spectrum, spread by the inverse square; at the skin
-/// it is that of the distance, behind the air before it; per mAs it is that of the tube.
+/// With an empty beam the kerma on the detector follows from the spectrum and the inverse-square law; the kerma at the skin
+/// from its distance; per mAs both follow from the tube output.
 #[test]
 fn air_kerma_is_that_of_the_beam() {
     let (spectrum, projection) = (sixty_kvp(), frontal(20, 5.0));
@@ -206,7 +206,7 @@ fn regions_outside_the_phantom_are_refused() {
     }
 }
 
-/// Labels are counted like materials when they are those of the materials; label 0 is left out.
+/// With the labels of the materials, dose by label equals dose by material; label 0 is left out.
 #[test]
 fn dose_by_label_is_that_of_its_voxels() {
     let phantom = limb(&Isometry3::identity());

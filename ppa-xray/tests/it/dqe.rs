@@ -1,4 +1,4 @@
-//! MTF and DQE by the method of IEC 62220-1 from simulated images of an edge and of an even field, against those of the model.
+//! MTF and DQE measured as in IEC 62220-1 from simulated images of an edge and of a uniform field, against those of the model.
 
 use std::f64::consts::PI;
 
@@ -23,7 +23,7 @@ fn rqa5() -> Spectrum {
     Spectrum::tungsten(&TubeSpec::new(70.0, 12.0, vec!["Al:23.5".parse().unwrap()])).unwrap()
 }
 
-/// Blur of the signal, and of the noise as far as it differs.
+/// Blur of the signal, and separately of the noise if `noise_h_mm2` is given.
 fn blur(noise_h_mm2: Option<f64>) -> Blur {
     Blur::Lorentzian {
         h_mm2: H_MM2,
@@ -61,7 +61,7 @@ fn prepared(phantom: VoxelPhantom) -> PreparedPhantom<'static> {
     PreparedPhantom::new(phantom, ComptonModel::default())
 }
 
-/// A plate of 1 mm of tungsten 2 mm in front of the detector; its edge passes the centre, a little tilted against the columns.
+/// A 1 mm tungsten plate 2 mm in front of the detector; its edge passes through the centre, slightly tilted against the columns.
 fn edge() -> VoxelPhantom {
     let turn: Matrix3<f64> =
         Rotation3::from_axis_angle(&Vector3::z_axis(), TILT_DEG.to_radians()).into_inner();
@@ -73,7 +73,7 @@ fn edge() -> VoxelPhantom {
     VoxelPhantom::new(grid, vec![0; 2], vec![0.0, 19.3], vec![tungsten]).unwrap()
 }
 
-/// Presampled MTF: the Fourier transform of the derivative of the edge profile, sampled by all rows in bins of an eighth of a pixel.
+/// Presampled MTF: the Fourier transform of the derivative of the edge profile, sampled by all rows in bins of 1/8 pixel.
 fn measured_mtf(image: &Radiograph) -> Vec<f64> {
     const BINS_PER_PIXEL: f64 = 8.0;
     const REACH: usize = 400;
@@ -99,7 +99,7 @@ fn measured_mtf(image: &Radiograph) -> Vec<f64> {
             re += line * cos;
             im += line * sin;
         }
-        // Bins and their differences blur by a bin each.
+        // Binning and differences each blur by one bin.
         re.hypot(im) / sinc(per_mm * step_mm).powi(2)
     };
     FREQUENCIES_PER_MM
@@ -119,7 +119,7 @@ fn model_mtf(per_mm: f64) -> f64 {
     sinc(per_mm * PIXEL_MM) / (1.0 + H_MM2 * per_mm * per_mm)
 }
 
-/// 1/(1 + H f²) is fitted within 0.012.
+/// The blur kernel fits 1/(1 + H f²) within 0.012.
 #[test]
 fn mtf_measured_with_an_edge_is_that_of_the_model() {
     for noise_h_mm2 in [None, Some(NOISE_H_MM2)] {
@@ -136,13 +136,14 @@ fn mtf_measured_with_an_edge_is_that_of_the_model() {
     }
 }
 
-/// DQE = MTF² / (Q NNPS) with Q photons per mm²; the model's is absorption times Swank factor, less electronic noise at high frequencies.
+/// DQE = MTF² / (Q NNPS) with Q photons per mm²; that of the model is absorption times Swank factor, reduced by electronic noise at high
+/// frequencies.
 #[test]
 fn dqe_measured_with_an_even_field_is_that_of_the_model() {
     assert_dqe(None);
 }
 
-/// The DQE is lower by (MTF / noise transfer)², but for aliases and electronic noise.
+/// The DQE is lower by (MTF / noise transfer)², apart from aliasing and electronic noise.
 #[test]
 fn dqe_falls_where_noise_is_blurred_less_than_signal() {
     let (plain, lubberts) = (assert_dqe(None), assert_dqe(Some(NOISE_H_MM2)));
@@ -161,7 +162,7 @@ fn dqe_falls_where_noise_is_blurred_less_than_signal() {
     }
 }
 
-/// The measured DQE in rings of frequency, after a comparison with the model.
+/// Compares the DQE with the model in rings of frequency and returns the measured values.
 fn assert_dqe(noise_h_mm2: Option<f64>) -> [f64; 5] {
     const IMAGES: u64 = 16;
     let vacuum = prepared(slab(10.0, 1e-9));
@@ -171,7 +172,7 @@ fn assert_dqe(noise_h_mm2: Option<f64>) -> [f64; 5] {
     let per_mm2 = histories / mm2;
     let ev = |value: f64| value * PIXEL_MM * PIXEL_MM / 100.0 * histories;
 
-    // One pixel without blur: the mean and the variance of what the photons leave.
+    // One pixel without blur: mean and variance of the signal of the photons.
     let sharp = image(&vacuum, &exposure(SIDE, None, 0.0), histories, 0);
     let centre = SIDE * SIDE / 2 + SIDE / 2;
     let signal_kev = ev(sharp.open_field_ev_cm2) / 1e3;
@@ -210,7 +211,7 @@ fn assert_dqe(noise_h_mm2: Option<f64>) -> [f64; 5] {
                     let nnps_mm2 = power_kev2 * PIXEL_MM * PIXEL_MM / (signal_kev * signal_kev);
                     mtf * mtf / (per_mm2 * nnps_mm2)
                 };
-                // The mean of powers, not of their inverses.
+                // Average powers, not their inverses.
                 rings[ring].0 += nps_kev2 / model_kev2;
                 rings[ring].1 += dqe(model_kev2);
                 rings[ring].2 += 1.0;
@@ -227,7 +228,7 @@ fn assert_dqe(noise_h_mm2: Option<f64>) -> [f64; 5] {
             model / ratio,
             model * error
         );
-        // 5 rings at 4.5 standard errors: 3e-5; and 2 % for the fit of the curve.
+        // 5 rings at 4.5 standard errors: 3e-5; plus 2 % for the fit of the curve.
         assert!(
             (ratio - 1.0).abs() < 4.5 * error + 0.02,
             "ring {ring}: {ratio} ± {error}"

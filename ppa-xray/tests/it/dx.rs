@@ -1,4 +1,4 @@
-//! DICOM Digital X-Ray images, read back.
+//! DICOM Digital X-Ray images, written and read back.
 
 use dicom_core::VR;
 use dicom_dictionary_std::{tags, uids};
@@ -146,14 +146,14 @@ fn exposure_indices_are_decimal_strings_of_the_image() {
         let found: f64 = text(&object, tag).parse().unwrap();
         assert!((found - expected).abs() <= 1e-7 * expected.abs(), "{tag}");
     }
-    // The expected image stands for no exposure.
+    // An expected image corresponds to no exposure.
     radiograph.histories = f64::INFINITY;
     let object = read(&write(&projection, &radiograph, "", DxIntent::Processing));
     assert!(object.element(tags::EXPOSURE_INDEX).is_err());
     assert!(object.element(tags::DEVIATION_INDEX).is_err());
 }
 
-/// A detector that is turned about its centre stays at its distance from the source.
+/// Rotating the detector about its centre does not change its distance from the source.
 #[test]
 fn the_detector_is_as_far_as_the_central_ray_says() {
     let (projection, mut radiograph) = exposed();
@@ -169,7 +169,7 @@ fn the_detector_is_as_far_as_the_central_ray_says() {
     }
 }
 
-/// A reader that applies the look-up table of the header shows the PNG, the black of the bare field included.
+/// A reader that applies the look-up table of the header shows the PNG, including the black of the unattenuated field.
 #[test]
 fn the_table_of_the_header_gives_the_grey_of_the_png() {
     let (projection, radiograph) = exposed();

@@ -1,4 +1,4 @@
-//! Source and detector as both engines see them.
+//! Source and detector, the same for both engines.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
@@ -24,8 +24,8 @@ fn grid() -> AntiScatterGrid {
         .with_lines_along(Default::default())
 }
 
-/// Everything at once: focal spot, heel effect, field off the detector's edges, detector off the axis and turned,
-/// grid at the wrong distance, scintillator.
+/// All effects at once: focal spot, heel effect, field edges inside the detector, detector off-axis and rotated, grid at the
+/// wrong distance, scintillator.
 fn demanding() -> Projection {
     let mut projection = frontal(12, 20.0);
     projection.detector.centre_mm = [15.0, -10.0];
@@ -52,8 +52,8 @@ fn demanding() -> Projection {
     projection
 }
 
-/// The few energies of the fast engine against all of the spectrum: the K edges of CsI (33.2 and 36.0 keV) and of the
-/// grid's strips (69.5 keV) are jumps of the detector's response.
+/// The few energies of the fast engine against the full spectrum: the detector's response jumps at the K edges of CsI (33.2
+/// and 36.0 keV) and of the grid's strips (69.5 keV).
 #[test]
 fn a_few_energies_know_the_edges_of_the_detector() {
     let phantom = slab(80.0, 1.0);
@@ -74,8 +74,8 @@ fn a_few_energies_know_the_edges_of_the_detector() {
     assert!(error.abs() < 3e-4, "{error:e}");
 }
 
-/// Analog against fast, every category over the quadrants of the detector: 16 differences, each within 4.2 standard
-/// errors (4e-4 for all). Both engines must see the same source and detector.
+/// Analog against fast, each category over the quadrants of the detector: 16 differences, each within 4.2 standard errors
+/// (4e-4 for all). Both engines must use the same source and detector.
 #[test]
 fn engines_agree_on_source_and_detector() {
     let (phantom, spectrum, projection) = (slab(80.0, 1.0), spectrum(), demanding());
@@ -106,7 +106,7 @@ fn engines_agree_on_source_and_detector() {
                 variance += f64::from(a.sigma[pixel]).powi(2);
                 sum += f64::from(b.value[pixel]);
             }
-            // The scatter of the fast engine has the same number of histories, spread over the quadrants.
+            // The scatter of the fast engine has the same number of histories, distributed over the quadrants.
             let both = if category == Category::Primary {
                 1.0
             } else {
@@ -123,8 +123,8 @@ fn engines_agree_on_source_and_detector() {
     }
 }
 
-/// The shadow of an edge is blurred by the focal spot: standard deviation s/√12 · b/a for a square of side s, a from the
-/// source to the edge and b from there to the detector.
+/// The focal spot blurs the shadow of an edge: standard deviation s/√12 · b/a for a square of side s, where a is the
+/// distance from the source to the edge and b from the edge to the detector.
 #[test]
 fn the_penumbra_is_as_wide_as_geometry_says() {
     let grid = Grid::axis_aligned(
@@ -144,7 +144,7 @@ fn the_penumbra_is_as_wide_as_geometry_says() {
     );
     let spread_mm = |projection: &Projection| {
         let image = primary(&phantom, &spectrum, projection, 4).unwrap();
-        // The bare field is not quite even: what falls by less than 1e-3 of the edge is no part of it.
+        // The unattenuated field is not quite uniform: steps below 1e-3 of the edge are not part of it.
         let edge = image[0] - image[119];
         let steps = image.windows(2).map(|pair| pair[0] - pair[1]);
         let steps: Vec<f64> = steps
@@ -169,7 +169,7 @@ fn the_penumbra_is_as_wide_as_geometry_says() {
     );
 }
 
-/// The edge of the field in vacuum: standard deviation s/√12 · (D/b − 1) for blades at b; nothing is lost, only spread.
+/// The edge of the field in vacuum has standard deviation s/√12 · (D/b − 1) for blades at b; the total signal is conserved.
 #[test]
 fn blades_blur_the_edges_of_the_field() {
     let vacuum = slab(10.0, 1e-9);
@@ -195,7 +195,7 @@ fn blades_blur_the_edges_of_the_field() {
     }
     let steps: Vec<f64> = image.windows(2).map(|pair| pair[0] - pair[1]).collect();
     let moment = |power: i32| -> f64 {
-        // The bare field is not quite even: 2 mm from the edge nothing is left of it.
+        // The unattenuated field is not quite uniform: use only the region within 2 mm of the edge.
         let terms = steps.iter().enumerate().take(120).skip(80);
         terms
             .map(|(i, step)| step * (0.1 * i as f64).powi(power))
@@ -212,7 +212,7 @@ fn blades_blur_the_edges_of_the_field() {
     assert!((blurred / sharp - 1.0).abs() < 2e-3, "{blurred} {sharp}");
 }
 
-/// A place x beyond the edge of the field is lit by the part of the area on the other side: ½ − x / ((D/b − 1) · side) of it.
+/// At a distance x beyond the edge of the field, the fraction ½ − x / ((D/b − 1) · side) of the extrafocal area is visible.
 #[test]
 fn extrafocal_radiation_passes_beyond_the_field() {
     let vacuum = slab(10.0, 1e-9);
@@ -231,7 +231,7 @@ fn extrafocal_radiation_passes_beyond_the_field() {
         .with_scatter_histories(320);
     let image = fast(&vacuum, &spectrum, &projection, &settings).unwrap();
     let values = image.total();
-    // All of the area lights the middle of the field.
+    // The whole area irradiates the middle of the field.
     let open = f64::from(values[50]) / (1.0 + ratio);
     assert!((f64::from(values[50]) / image.open_field_ev_cm2 - 1.0).abs() < 2e-3);
     for (pixel, value) in values.into_iter().enumerate() {
@@ -241,12 +241,12 @@ fn extrafocal_radiation_passes_beyond_the_field() {
         let inside = f64::from(u8::from(x_mm < 50.0));
         let expected = (inside + ratio * lit) * cos.powi(3) * open;
         let error = (f64::from(value) - expected) / open;
-        // Over the 20 mm of the area cos³θ is not quite even.
+        // cos³θ varies slightly over the 20 mm of the area.
         assert!(error.abs() < 1e-3, "{x_mm} mm: {error}");
     }
 }
 
-/// Kerma at the skin per mAs: more by the ratio where the blades leave the whole area visible.
+/// Kerma at the skin per mAs: higher by the extrafocal ratio where the blades leave the whole area visible.
 #[test]
 fn extrafocal_radiation_adds_to_the_entrance_kerma() {
     let (phantom, spectrum) = (slab(80.0, 1.0), spectrum());
@@ -308,8 +308,8 @@ fn blades_whose_shadow_fills_the_field_are_refused() {
     }
 }
 
-/// Outside the field nothing arrives but scatter; the pixel that the edge cuts reads its share; photons that miss the
-/// detector are counted as histories.
+/// Outside the field only scatter arrives; a pixel cut by the edge reads its share; photons that miss the detector are
+/// counted as histories.
 #[test]
 fn the_field_has_sharp_edges() {
     let vacuum = slab(10.0, 1e-9);
@@ -324,7 +324,7 @@ fn the_field_has_sharp_edges() {
     let row = &image[50..60];
     assert!(row[..2].iter().all(|&value| value == 0.0));
     assert!((row[2] / row[3] - 0.25).abs() < 0.01, "{row:?}");
-    // 45 x 400 mm instead of 100 x 100 mm take the same photons: 1.8 times the area, less obliquity.
+    // 45 x 400 mm instead of 100 x 100 mm receive the same photons: 1.8 times the area, less obliquity.
     let share = row[5] / open[55];
     assert!((share - 1.0 / 1.8).abs() < 0.01, "{share}");
     let settings = AnalogSettings::default()
@@ -337,7 +337,7 @@ fn the_field_has_sharp_edges() {
     assert!((on_detector - expected).abs() < 4.0 * error); // 6e-5
 }
 
-/// The reading of the bare field per mAs falls with the square of the distance; the field of a fan grows with it.
+/// The reading per mAs in the unattenuated field falls with the square of the distance; the field of a fan grows with it.
 #[test]
 fn readings_per_mas_follow_the_inverse_square() {
     let spectrum = spectrum();
@@ -365,8 +365,8 @@ fn readings_per_mas_follow_the_inverse_square() {
     );
 }
 
-/// Quantum noise of a scintillator: variance over mean of the readings of many pixels is ⟨ε²⟩/⟨ε⟩, above that of
-/// the ideal detector by the Swank factor; analog against the moments of the table through the fast engine.
+/// Quantum noise of a scintillator: variance over mean of the readings of many pixels is ⟨ε²⟩/⟨ε⟩, higher than for the ideal
+/// detector by the Swank factor. The analog engine is compared with the moments of the table used by the fast engine.
 #[test]
 fn noise_of_a_scintillator_is_compound_poisson() {
     let vacuum = slab(10.0, 1e-9);
@@ -411,8 +411,8 @@ fn noise_of_a_scintillator_is_compound_poisson() {
     );
 }
 
-/// Blur and electronic noise of the read-out: readings scatter as the standard errors say, and both engines keep their
-/// sums. The noise of a blurred image is correlated, so that the 10 000 pixels count as fewer.
+/// Blur and electronic noise of the read-out: readings scatter according to their standard errors, and both engines conserve
+/// the sums. The noise of a blurred image is correlated, so the 10 000 pixels count as fewer.
 #[test]
 fn readings_scatter_as_their_standard_errors_say() {
     let vacuum = slab(10.0, 1e-9);

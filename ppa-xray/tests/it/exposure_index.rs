@@ -52,7 +52,7 @@ fn vacuum() -> VoxelPhantom {
     slab(10.0, 1e-7)
 }
 
-/// Photons into the field that give 2.5 µGy at the centre of the detector: they are emitted evenly into its solid angle,
+/// Photons into the field that give 2.5 µGy at the centre of the detector. They are emitted uniformly into its solid angle,
 /// 4 atan(a²/(d √(2a² + d²))) for a square of half side a.
 fn histories_of_2_5_ugy() -> f64 {
     let (a, d) = (0.5 * SIDE_MM, DISTANCE_MM);
@@ -69,7 +69,7 @@ fn index_of_2_5_ugy_of_rqa5_is_250() {
     }
 }
 
-/// The grid takes a part of the signal, which the calibration does not make up for.
+/// The grid absorbs part of the signal, and the calibration does not compensate for it.
 #[test]
 fn a_grid_lowers_the_index_by_its_transmission() {
     let [_, csi, _] = receptors();
@@ -103,7 +103,7 @@ fn index_is_proportional_to_the_exposure() {
     assert_eq!(expected_image.exposure_index(&csi).unwrap(), None);
 }
 
-/// A slab over all of the field lets a share of the beam pass, and the limb in half of the field decides alone.
+/// A slab over the whole field transmits part of the beam; only the limb, in half of the field, determines the index.
 #[test]
 fn index_is_that_of_the_limb_not_of_the_open_field() {
     let [ideal, ..] = receptors();

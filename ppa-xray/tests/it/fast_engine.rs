@@ -1,4 +1,4 @@
-//! The fast engine gives what the analog engine gives, in the mean and in its errors.
+//! The fast engine agrees with the analog engine, in the mean and in the errors.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
@@ -39,7 +39,7 @@ fn blocks(image: &Radiograph, category: Category, side: usize) -> Vec<(f64, f64)
     blocks
 }
 
-/// 4 x 4 blocks of three kinds of scatter: χ² with 48 degrees of freedom, and the three sums.
+/// Compares 4 x 4 blocks of three kinds of scatter (χ² with 48 degrees of freedom) and the three sums.
 pub fn assert_scatter_agrees(image: &Radiograph, expected: &Radiograph) {
     let mut chi2 = 0.0;
     for category in SCATTER {
@@ -80,7 +80,7 @@ fn contrast_medium() -> VoxelPhantom {
     VoxelPhantom::new(grid, material, density, vec![water, contrast.unwrap()]).unwrap()
 }
 
-/// Three sums and 48 blocks, as for tissue; without K x-rays multiple scatter would be 70 % too low.
+/// Three sums and 48 blocks, as for tissue; without K x-rays, multiple scatter would be 70 % too low.
 #[test]
 fn k_x_rays_behind_contrast_medium_are_those_of_analog() {
     let (phantom, spectrum) = (contrast_medium(), Spectrum::monoenergetic(50.0).unwrap());
@@ -162,7 +162,7 @@ fn scatter_of_a_demanding_source_is_that_of_analog() {
     assert!((0.4..0.8).contains(&share), "{share} of the corner is left");
 }
 
-/// Extrafocal radiation of half the intensity from 30 mm, in a field of 90 mm: the field's edge reaches 45 mm to both sides.
+/// Extrafocal radiation of half the intensity from 30 mm, in a field of 90 mm, whose edges reach 45 mm to both sides.
 #[test]
 fn extrafocal_radiation_is_that_of_analog() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
@@ -189,7 +189,7 @@ fn extrafocal_radiation_is_that_of_analog() {
         .map(|((found, _), (expected, variance))| (found - expected).powi(2) / variance)
         .sum();
     assert!(chi2 < 79.0, "chi² = {chi2:.1} with 36 degrees of freedom"); // 5e-5
-    // The same rays by the deterministic primary.
+    // The same rays in the deterministic primary.
     let exact: f64 = primary(&phantom, &spectrum, &projection, 4)
         .unwrap()
         .iter()
@@ -201,8 +201,8 @@ fn extrafocal_radiation_is_that_of_analog() {
     assert!((image.open_field_ev_cm2 / expected.open_field_ev_cm2 - 1.0).abs() < 1e-12);
 }
 
-/// Extrafocal photons alone change the image by up to a third; their rays go to pixels of 2 mm, against 64 points of the area and
-/// 9 rays for each pixel of 1 mm.
+/// Extrafocal photons change the image by up to a third. Their rays are traced on a 2 mm grid and compared with 64 points of the
+/// area and 9 rays for each 1 mm pixel.
 #[test]
 fn primary_of_extrafocal_photons_is_that_of_many_rays() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
@@ -236,7 +236,7 @@ fn primary_of_extrafocal_photons_is_that_of_many_rays() {
     }
 }
 
-/// Rays that are added where they are needed, and few energies for the spectrum, against 64 x 64 rays per pixel and all energies.
+/// Adaptive rays and a few energies per spectrum against 64 x 64 rays per pixel and all energies.
 #[test]
 fn primary_is_that_of_many_rays() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
@@ -257,8 +257,8 @@ fn primary_is_that_of_many_rays() {
     }
 }
 
-/// A focal spot whose penumbra is a fifth of a pixel, a half and two pixels wide, against 64 rays per pixel from each of
-/// 64 points of the spot. The pin's edges are nine tenths of the signal high.
+/// A focal spot with a penumbra of 0.2, 0.5 and 2 pixels, against 64 rays per pixel from each of 64 points of the spot. The
+/// pin's edges are steps of nine tenths of the signal.
 #[test]
 fn primary_of_a_focal_spot_is_that_of_many_rays() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
@@ -285,8 +285,8 @@ fn primary_of_a_focal_spot_is_that_of_many_rays() {
     }
 }
 
-/// A straight edge whose penumbra is three pixels wide darkens pixels that rays from the middle of the spot find even. The
-/// edge is half of the signal high.
+/// A straight edge with a penumbra three pixels wide darkens pixels that look uniform to rays from the middle of the spot.
+/// The edge is a step of half the signal.
 #[test]
 fn the_shadow_of_an_edge_reaches_pixels_beside_it() {
     let grid = Grid::axis_aligned(
@@ -324,8 +324,8 @@ fn mean_and_variance(values: &[f64]) -> (f64, f64) {
     (mean, squares.sum::<f64>() / (n - 1.0))
 }
 
-/// Twenty seeds: the sums of each kind scatter as their standard errors say, a fourfold effort halves them, and the means
-/// do not depend on the effort nor on the distance of the points.
+/// Twenty seeds: the sums of each kind scatter according to their standard errors, four times the histories halve the
+/// errors, and the means depend neither on the number of histories nor on the spacing of the points.
 #[test]
 #[ignore = "takes a minute"]
 fn errors_are_what_twenty_seeds_show() {
@@ -401,14 +401,14 @@ fn noise_is_white_and_as_large_as_that_of_analog() {
         .zip(smooth.total())
         .map(|(noisy, smooth)| f64::from(noisy - smooth))
         .collect();
-    // Analog pixels state the variance that their photons had: four times as many have a quarter.
+    // The variance in analog pixels is that of a quarter of the photons.
     let variance: Vec<f64> = counted
         .sigma()
         .iter()
         .map(|sigma| f64::from(*sigma).powi(2) / 4.0)
         .collect();
     let ratio = difference.iter().map(|d| d * d).sum::<f64>() / variance.iter().sum::<f64>();
-    // Bright pixels count most: about 1500 of them, √(2/1500) = 3.7 %.
+    // Bright pixels dominate: about 1500 of them, √(2/1500) = 3.7 %.
     assert!(
         (ratio - 1.0).abs() < 0.17,
         "variance over that of analog: {ratio}"
@@ -424,7 +424,7 @@ fn noise_is_white_and_as_large_as_that_of_analog() {
     }
 }
 
-/// At the cut-off energy any Compton scattering ends a photon: the image has primary and Rayleigh scatter only.
+/// At the cut-off energy any Compton scattering ends a photon: the image has only primary and Rayleigh scatter.
 #[test]
 fn photons_of_the_cutoff_energy_make_an_image() {
     let phantom = limb(&Isometry3::identity());
@@ -441,7 +441,7 @@ fn photons_of_the_cutoff_energy_make_an_image() {
     assert!(image.sums.of(Category::Primary).0 > 0.0);
 }
 
-/// Numbers beyond all sense are refused in one sentence, not carried out.
+/// Absurd settings are refused with a one-sentence message.
 #[test]
 fn settings_beyond_all_sense_are_refused() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());

@@ -57,7 +57,7 @@ fn exr_returns_every_layer_and_the_same_bytes_each_time() {
     assert_eq!(table["seed"].as_integer(), Some(77));
     assert_eq!(table["source_detector_mm"].as_integer(), Some(1_100));
     assert_eq!(table["unit"].as_str(), Some("eV/cm2 per history"));
-    // A line without a tube: nobody knows its output.
+    // A monoenergetic spectrum without a tube: its output is unknown.
     assert!(!table.contains_key("mas"));
 }
 
@@ -75,7 +75,7 @@ fn png_holds_sixteen_bits_with_bone_white_and_air_black() {
     assert!(corner < 2_000 && centre > 40_000, "{corner} {centre}");
 }
 
-/// Steps of 60 mm, wide against the size of detail, that double the exposure each time, for every protocol.
+/// Steps 60 mm wide, large compared with the size of detail, each doubling the exposure; for every protocol.
 #[test]
 fn a_step_wedge_gets_darker_with_every_step_of_exposure() {
     let mut wedge = radiograph();
@@ -103,7 +103,7 @@ fn a_step_wedge_gets_darker_with_every_step_of_exposure() {
     }
 }
 
-/// The window is fixed: a metal plate in one corner leaves the far corner as it was. A fitted one is asked for.
+/// The window is fixed: a metal plate in one corner does not change the far corner. A fitted window is optional.
 #[test]
 fn grey_values_do_not_depend_on_the_rest_of_the_image() {
     let image = radiograph();

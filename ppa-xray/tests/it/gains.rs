@@ -1,4 +1,4 @@
-//! Gains of pixels: a pattern of the panel, in images of both engines.
+//! Pixel gains: a fixed pattern of the panel in images of both engines.
 
 use ppa_xray::{
     AnalogSettings, Category, FastSettings, Projection, Radiograph, Spectrum, analog, fast,
@@ -25,14 +25,14 @@ fn image(projection: &Projection, water_g_cm3: f32, histories: f64, seed: u64) -
     fast(&slab(10.0, water_g_cm3), &spectrum, projection, &settings).unwrap()
 }
 
-/// Gains of all pixels, from an image with and one without an error.
+/// Gains of all pixels, from images with and without a gain error.
 fn pattern(with: &Radiograph, without: &Radiograph) -> Vec<f32> {
     let pairs = with.total().into_iter().zip(without.total());
     pairs.map(|(a, b)| a / b).collect()
 }
 
-/// Other seeds, other phantoms and noise leave the pattern; an even field varies by the error, 1e4 pixels within 4.5 standard errors, about the same mean. Another panel has another
-/// pattern.
+/// The pattern does not depend on seed, phantom or noise. In a uniform field of 1e4 pixels its spread is the gain error and its mean 1,
+/// both within 4.5 standard errors. Another panel has another pattern.
 #[test]
 fn the_pattern_is_that_of_the_panel() {
     let (error, expected) = (0.02, f64::INFINITY);
@@ -67,7 +67,7 @@ fn the_pattern_is_that_of_the_panel() {
     assert!(correlation.abs() < 4.5 / n.sqrt(), "{correlation}");
 }
 
-/// The ratio of two images of a panel is free of the pattern; standard errors have it, the electronic noise has not.
+/// The ratio of two images of a panel is free of the pattern; standard errors contain it, the electronic noise does not.
 #[test]
 fn flat_fielding_removes_the_pattern() {
     let expected = f64::INFINITY;
@@ -94,7 +94,7 @@ fn flat_fielding_removes_the_pattern() {
             assert!((value / sigma - 1.0).abs() < 1e-5, "{value} {sigma}");
         }
     }
-    // What electronics add is the same with and without gains.
+    // The electronic noise is the same with and without gains.
     let electronic = |image: &Radiograph, pixel: usize| {
         let photons = Category::ALL.map(|category| image.layer(category).value[pixel]);
         image.total()[pixel] - photons.iter().sum::<f32>()

@@ -1,4 +1,4 @@
-//! Density between the centres of voxels: trilinear, and the same in every engine.
+//! Trilinear interpolation of density between voxel centres, the same in every engine.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use ppa_ct::Grid;
@@ -9,12 +9,12 @@ use ppa_xray::{
 
 use crate::scenes::{frontal, limb, sixty_kvp};
 
-/// The limb of the other tests has steps of density at bone, pin and skin in every direction.
+/// The limb of the other tests has density steps at bone, pin and skin in all directions.
 fn smooth_limb() -> VoxelPhantom {
     limb(&Isometry3::identity()).with_interpolation(Interpolation::Trilinear)
 }
 
-/// Sums of all categories, fast and analog: four differences beyond 4.5 standard errors raise a false alarm once in 4e4. The primary
+/// Sums of all categories, fast and analog: four differences beyond 4.5 standard errors are a false alarm once in 4e4. The primary
 /// is known to 0.1 %, scatter to 0.7 to 1.5 %.
 #[test]
 fn engines_agree_on_a_trilinear_limb() {
@@ -34,7 +34,7 @@ fn engines_agree_on_a_trilinear_limb() {
         println!("{category:?}: {a:.3} ± {se_a:.3}, {b:.3} ± {se_b:.3}: z = {z:+.1}");
         assert!(z.abs() < 4.5, "{category:?}: {a} {b}, z = {z:.1}");
     }
-    // The primary of every pixel but the darkest, which see a few photons only.
+    // The primary of all pixels except the darkest, which receive only a few photons.
     let layer = expected.layer(Category::Primary);
     let found = &image.layer(Category::Primary).value;
     let (mut chi2, mut pixels) = (0.0, 0.0);
@@ -49,8 +49,8 @@ fn engines_agree_on_a_trilinear_limb() {
     assert!(pixels > 900.0 && z.abs() < 4.5, "{chi2} {pixels}");
 }
 
-/// Pixels of a third of a voxel and of a whole one and a focal spot, with few rays each, against 64 rays from each of 64 points of the spot: an
-/// expected image, which has no noise to hide errors in.
+/// Pixels of a third of a voxel and of one voxel and a focal spot, with few rays each, against 64 rays from each of 64 points of the spot.
+/// The expected image has no noise that could hide errors.
 #[test]
 fn primary_of_fine_pixels_is_that_of_many_rays() {
     let (phantom, spectrum) = (smooth_limb(), sixty_kvp());
@@ -75,11 +75,11 @@ fn primary_of_fine_pixels_is_that_of_many_rays() {
     }
 }
 
-/// A beam along the axis of a step between two centres: the density between them is a mean of both, and a wedge of a voxel's
-/// width attenuates as the exponential of its thickness at every pixel.
+/// A beam along a density step between two voxel centres: the density between them is interpolated, and each pixel
+/// is attenuated as by a wedge one voxel wide.
 #[test]
 fn step_between_two_voxels_is_a_ramp_one_voxel_wide() {
-    // 2 mm of nothing and of water side by side, 10 mm thick, with the step at x = 0.
+    // Vacuum and water side by side, each 2 mm wide and 10 mm thick, with the step at x = 0.
     let grid = Grid::axis_aligned(
         [2, 1, 1],
         Vector3::new(2.0, 40.0, 10.0),
@@ -95,7 +95,7 @@ fn step_between_two_voxels_is_a_ramp_one_voxel_wide() {
     .unwrap()
     .with_interpolation(Interpolation::Trilinear);
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
-    // From so far away and so close to the detector that rays are as good as parallel.
+    // A distant source and a close detector make the rays nearly parallel.
     let projection = frontal(37, 0.1)
         .with_source_detector_mm(9_006.0)
         .with_ct_from_device(Isometry3::translation(0.0, 0.0, -9_000.0));
@@ -107,7 +107,7 @@ fn step_between_two_voxels_is_a_ramp_one_voxel_wide() {
         let density = ((x + 1.0) / 2.0).clamp(0.0, 1.0);
         let expected = (-mu * 10.0 * density).exp();
         let found = value / row[0];
-        // Not at the pixels that the ramp ends in.
+        // Skip the pixels at the ends of the ramp.
         let ends = (x.abs() - 1.0).abs() < 0.06;
         assert!(
             ends || (found / expected - 1.0).abs() < 2e-4,
@@ -116,7 +116,7 @@ fn step_between_two_voxels_is_a_ramp_one_voxel_wide() {
     }
 }
 
-/// A bone of 24 mm, 17 degrees from the axis of slices of 3.3 mm, each voxel with the density at its centre; edges are 1.5 mm wide.
+/// A bone of 24 mm tilted by 17 degrees against the axis of the slices, each voxel with the density at its centre; edges are 1.5 mm wide.
 fn tilted_bone(slice_mm: f64, interpolation: Interpolation) -> VoxelPhantom {
     let size = [60, 60, (66.0 / slice_mm).round() as usize];
     let spacing = Vector3::new(0.8, 0.8, slice_mm);
@@ -142,7 +142,7 @@ fn tilted_bone(slice_mm: f64, interpolation: Interpolation) -> VoxelPhantom {
         .with_interpolation(interpolation)
 }
 
-/// Steps of homogeneous slices come out as a comb on the edges of the bone. Between trilinear slices there is none.
+/// Density steps of homogeneous slices show as a comb along the edges of the bone; with trilinear interpolation there is none.
 #[test]
 fn thick_slices_leave_no_comb() {
     let spectrum = Spectrum::monoenergetic(40.0).unwrap();

@@ -1,4 +1,4 @@
-//! Checks of the public interface, some against reference data that is not part of the repository.
+//! Tests of the public interface, some against reference data outside the repository.
 
 mod attenuation;
 mod beer_lambert;

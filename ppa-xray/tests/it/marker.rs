@@ -1,4 +1,4 @@
-//! The side marker takes the same from the images of both engines.
+//! The side marker attenuates images of both engines alike.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
@@ -10,7 +10,7 @@ use ppa_xray::{
 use crate::fast_engine::assert_scatter_agrees;
 use crate::scenes::{frontal, limb, sixty_kvp};
 
-/// 30 mm of water over the whole field: light is even within a pixel.
+/// 30 mm of water over the whole field: the signal is uniform within a pixel.
 fn slab() -> VoxelPhantom {
     let first = Point3::new(-95.0, -95.0, -10.0);
     let grid = Grid::axis_aligned([20, 20, 3], Vector3::repeat(10.0), first).unwrap();
@@ -27,7 +27,7 @@ fn total(image: &Radiograph) -> Vec<f64> {
         .collect()
 }
 
-/// Primary in about 50 pixels that the letter covers by less than 70 %: χ² over its degrees of freedom above 2.1 by chance once in 1e5.
+/// Primary in about 50 pixels that the letter covers by less than 70 %: χ² per degree of freedom exceeds 2.1 by chance once in 1e5.
 #[test]
 fn both_engines_leave_the_same_beside_the_letter() {
     let (phantom, spectrum) = (slab(), sixty_kvp());
@@ -53,7 +53,7 @@ fn both_engines_leave_the_same_beside_the_letter() {
     let (mut chi2, mut pixels) = (0.0, 0.0);
     for pixel in 0..found.len() {
         if found[pixel] == 0.0 {
-            // Slivers narrower than a sixteenth of a pixel may be free.
+            // Slivers narrower than a sixteenth of a pixel may remain uncovered.
             let counted = f64::from(counted.total()[pixel]);
             assert!(counted < 0.02 * light[pixel], "{counted}");
         } else if (0.3..0.99).contains(&(found[pixel] / light[pixel])) {
@@ -68,7 +68,7 @@ fn both_engines_leave_the_same_beside_the_letter() {
     assert!(pixels > 30.0 && chi2 / pixels < 2.1, "{chi2} of {pixels}");
 }
 
-/// Sums of layers are those of their pixels, and the ray-traced primary has the letter too.
+/// Sums of layers equal the sums over their pixels, and the ray-traced primary shows the letter too.
 #[test]
 fn sums_and_the_ray_traced_primary_have_the_letter() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());

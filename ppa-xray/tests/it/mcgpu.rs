@@ -1,4 +1,4 @@
-//! Input files of MC-GPU v1.3, run as they are.
+//! Input files of MC-GPU v1.3, run unchanged.
 
 use std::fmt::Write;
 use std::fs;
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::shared;
 
-/// An input file: what differs between the tests, in the order of the file.
+/// Parts of an input file that differ between tests, in file order.
 pub struct Sections<'a> {
     length: &'a str,
     source: &'a str,
@@ -43,7 +43,7 @@ impl Sections<'_> {
     }
 }
 
-/// A water box of 8 cm x 6 cm x 4 cm, 1 cm voxels, with a block of bone near the corner of low x, y and z.
+/// Writes a water box of 8 cm x 6 cm x 4 cm in 1 cm voxels with a block of bone near the corner of low x, y and z.
 fn write_phantom(folder: &Path) {
     let mut text = "[SECTION VOXELS HEADER v.2008-04-13]\n8 6 4 voxels\n1 1 1 cm\n1\n2\n0\n[END OF VXH SECTION]\n".to_owned();
     for z in 0..4 {
@@ -82,7 +82,7 @@ fn photons(simulation: &Simulation, station: &Station, histories: u64) -> Radiog
         .0
 }
 
-/// The shadow of the bone turns as the source does: it lies at low x, y and z.
+/// The shadow of the bone, which is at low x, y and z, moves with the source.
 #[test]
 fn a_scan_has_the_projections_of_mcgpu_in_order() {
     let folder = tempfile::tempdir().unwrap();
@@ -95,8 +95,8 @@ fn a_scan_has_the_projections_of_mcgpu_in_order() {
     let stations = simulation.input().stations();
     let angles: Vec<f64> = stations.iter().map(|s| s.angle_deg).collect();
     assert_eq!(angles, [270.0, 360.0, 450.0, 540.0]);
-    // Columns run along x and y as seen from −y and +x, along −x and −y as seen from +y and −x. The bone ends 3 cm and
-    // 2 cm from the axis and is magnified about twice; it lies in the 2 cm below the middle.
+    // Columns run along x and y as seen from −y and +x, and along −x and −y as seen from +y and −x. The bone ends 3 cm and 2
+    // cm from the axis and is magnified about twice; it is in the 2 cm below the middle.
     let low_side = [(5..8, true), (7..10, true), (5..8, false), (7..10, false)];
     for (station, (columns, on_the_left)) in stations.iter().zip(low_side) {
         let image = simulation.image(&photons(&simulation, station, 40_000));
@@ -148,7 +148,7 @@ fn a_dose_of_another_simulation_is_refused_and_not_added() {
     assert_eq!(sums.histories(), 2_000);
 }
 
-/// Every file that MC-GPU would write, in its layout, and the sums of the text, the raw file and the result agree.
+/// All files of MC-GPU are written in its layout, and the sums of the text, the raw file and the result agree.
 #[test]
 fn images_and_doses_are_written_as_mcgpu_does() {
     let folder = tempfile::tempdir().unwrap();
@@ -208,7 +208,7 @@ fn images_and_doses_are_written_as_mcgpu_does() {
     assert!((materials[2].mass_g - 4.0 * 1.85).abs() < 1e-5);
     let sum: f64 = materials.iter().map(|m| m.ev_per_history.value).sum();
     assert!((1e-3 * sum / imparted_kev - 1.0).abs() < 1e-9);
-    // The region is cut at the border: 8 x 6 x 3 voxels. Dose times mass is the energy.
+    // The region is clipped at the border: 8 x 6 x 3 voxels. Dose times mass is the energy.
     scan_dose.write(folder.path(), &simulation).unwrap();
     let raw = fs::read(folder.path().join("dose.dat.raw")).unwrap();
     let errors = fs::read(folder.path().join("dose.dat_PercentRelError2sigma.raw")).unwrap();
@@ -239,7 +239,7 @@ fn images_and_doses_are_written_as_mcgpu_does() {
     );
 }
 
-/// The fan opens along the columns first. The field is where primary photons arrive, a pencil has no width.
+/// The first aperture is along the columns. The field is where primary photons arrive; a pencil beam has no width.
 #[test]
 fn apertures_are_along_columns_then_rows() {
     let folder = tempfile::tempdir().unwrap();
@@ -333,7 +333,7 @@ fn what_an_input_file_names_must_fit() {
     );
 }
 
-/// Seeds of the projections differ, and the first is that of the file.
+/// Projections have different seeds, and the first has that of the file.
 #[test]
 fn projections_have_histories_of_their_own() {
     let folder = tempfile::tempdir().unwrap();
@@ -356,7 +356,7 @@ fn projections_have_histories_of_their_own() {
     assert_eq!(all.len(), 8);
 }
 
-/// The frame of the voxel box is kept: its corner is the origin, and the device stands where the file says.
+/// The frame of the voxel box is kept: its corner is the origin, and the device has the position given in the file.
 #[test]
 fn the_frame_is_that_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -371,7 +371,7 @@ fn the_frame_is_that_of_the_file() {
     assert!((high.coords - Vector3::new(80.0, 60.0, 40.0)).norm() < 1e-12);
 }
 
-/// Case a from an input file, with the material files and the spectrum that MC-GPU had.
+/// Case a from an input file, with the material files and the spectrum used by MC-GPU.
 #[test]
 #[ignore = "needs ../shared/reference/xray"]
 fn case_a_from_its_input_file_agrees_with_mcgpu() {
@@ -427,7 +427,7 @@ fn case_a_from_its_input_file_agrees_with_mcgpu() {
         );
         assert!((found / expected - 1.0).abs() < tolerance);
     }
-    // Mean energy of the spectrum: what is emitted either stays, arrives, or flies past.
+    // Mean energy of the spectrum: emitted energy is absorbed, reaches the detector or escapes.
     let dose = dose.unwrap();
     let stays = dose.phantom.ev_per_history.value + image.sums.total_ev_per_history();
     let emitted = 1e3 * simulation.spectrum().mean_energy_kev();

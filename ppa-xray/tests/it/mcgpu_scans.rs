@@ -1,4 +1,4 @@
-//! Scans of MC-GPU input files that are interrupted, or followed in parts.
+//! Scans of MC-GPU input files that are interrupted or divided into parts.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -23,7 +23,7 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// Every call follows one batch of histories and is then cut off; the next one resumes from the file.
+/// Each call runs one batch of histories and is then interrupted; the next one resumes from the file.
 #[test]
 fn a_scan_cut_into_pieces_writes_the_same_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -106,7 +106,7 @@ fn interrupted_parts_merge_to_the_projection_of_one_run() {
         assert_eq!(found.done, found.part);
         assert_eq!(found.of_run, histories);
         let left = simulation.missing_part_bytes(&part(number, false)).unwrap();
-        // Numbers of histories in its header take a few digits more or less.
+        // Numbers of histories in its header vary by a few digits.
         let written = fs::metadata(&tally).unwrap().len();
         assert!((missing - left).abs_diff(written) < 100);
     }
@@ -118,7 +118,7 @@ fn interrupted_parts_merge_to_the_projection_of_one_run() {
     let refused = simulation.merge_parts(station, histories + 1, &out);
     assert!(refused.unwrap_err().to_string().contains("60001"));
 
-    // The tally of another seed is continued by nothing, and replaced on request.
+    // A tally of another seed is never continued, and replaced only on request.
     simulation.set_seed(99);
     let follow = |replace| {
         simulation.follow_part(station, &part(1, replace), Duration::MAX, |_| {

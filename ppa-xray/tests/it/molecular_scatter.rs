@@ -1,4 +1,4 @@
-//! Rayleigh scattering by measured form factors.
+//! Rayleigh scattering with measured form factors.
 
 use nalgebra::Isometry3;
 use ppa_xray::{
@@ -18,7 +18,7 @@ fn molecular(name: &str) -> Material {
         .with_form_factors(FormFactors::Molecular)
 }
 
-/// F² of sampled angles, in bins of 0.01/Å around q: counts over 1 + cos²θ and the width in q².
+/// F² from sampled angles, in bins of 0.01/Å around q: counts divided by 1 + cos²θ and by the width in q².
 fn sampled_form_factor_squared(material: &Material, energy_kev: f64, samples: u32) -> Vec<f64> {
     let tables = MaterialTables::new(material, ComptonModel::default());
     let mut uniform = uniforms(71);
@@ -39,10 +39,10 @@ fn sampled_form_factor_squared(material: &Material, energy_kev: f64, samples: u3
     bins
 }
 
-/// Liquid water has its peak at 0.16/Å, the lipids of fat at 0.11 to 0.12/Å, both far above what is left near q = 0.
+/// Liquid water has its peak at 0.16/Å and the lipids of fat at 0.11 to 0.12/Å, both far above the level near q = 0.
 ///
-/// Narten and Levy 1971 and Kosanetzky et al., Med. Phys. 14 (1987) 526 give 1.6/nm and 1.1/nm. A bin at the peak holds some 3e4 of 1e6 samples:
-/// neighbours that differ by 2 % are 2.5 standard errors apart, hence a tolerance of one bin.
+/// Narten and Levy 1971 and Kosanetzky et al., Med. Phys. 14 (1987) 526 give 1.6/nm and 1.1/nm. A bin at the peak holds about 3e4 of 1e6
+/// samples: neighbours that differ by 2 % are 2.5 standard errors apart, hence a tolerance of one bin.
 #[test]
 fn peaks_of_water_and_fat_are_where_they_were_measured() {
     for (name, peak, at_zero) in [
@@ -54,7 +54,7 @@ fn peaks_of_water_and_fat_are_where_they_were_measured() {
             .max_by(|&a, &b| squared[a].total_cmp(&squared[b]))
             .unwrap();
         assert!(highest.abs_diff(peak) <= 1, "{name}: {highest}/100 Å");
-        // 4 bins of together 2e3 samples or more.
+        // 4 bins with 2e3 samples or more in total.
         let low = squared[1..5].iter().sum::<f64>() / 4.0 / squared[peak];
         assert!((low / at_zero - 1.0).abs() < 0.15, "{name}: {low}");
         // Free atoms have no peak.
@@ -86,7 +86,7 @@ fn densities_of_measured_form_factors_integrate_to_one() {
     }
 }
 
-/// As `fast_engine::scatter_is_that_of_analog`, and the choice changes the picture at all.
+/// As in `fast_engine::scatter_is_that_of_analog`; also checks that the choice changes the image.
 #[test]
 fn molecular_scatter_of_the_fast_engine_is_that_of_analog() {
     let atoms = limb(&Isometry3::identity());

@@ -1,7 +1,7 @@
-//! Power spectrum of the noise of even exposures: both engines against the formula, with and without blur.
+//! Noise power spectrum of uniform exposures: both engines against the formula, with and without blur.
 //!
-//! Blur takes the image beyond its edges for its mirror image, so cosine waves of the whole image keep apart: their
-//! coefficients are independent, with the noise power at their frequency for variance.
+//! Blur continues the image beyond its edges as its mirror image, so the cosine waves of the whole image stay separate:
+//! their coefficients are independent, and their variance is the noise power at their frequency.
 
 use std::f64::consts::PI;
 
@@ -19,7 +19,7 @@ const H_MM2: f64 = 0.45;
 const BANDS: usize = 8;
 const HISTORIES: u64 = 200_000;
 
-/// Noise power over that of white noise at a frequency in cycles per pixel; `h_mm2` is 0 without blur.
+/// Noise power relative to white noise at a frequency in cycles per pixel; `h_mm2` is 0 without blur.
 pub fn expected_power(h_mm2: f64, pixel_mm: f64, fx: f64, fy: f64) -> f64 {
     if h_mm2 == 0.0 {
         return 1.0;
@@ -57,13 +57,13 @@ fn lubberts() -> Blur {
     }
 }
 
-/// Squared coefficients of an image of [`SIDE`]² pixels in orthonormal cosine waves.
+/// Squared coefficients of an image of [`SIDE`]² pixels in an orthonormal cosine basis.
 pub fn spectrum(image: &[f32]) -> Vec<f64> {
     let wave = |k: usize, at: usize| {
         let scale = if k == 0 { 1.0_f64 } else { 2.0 };
         (scale / SIDE as f64).sqrt() * (PI * k as f64 * (at as f64 + 0.5) / SIDE as f64).cos()
     };
-    // Waves along rows, then along the columns of what that leaves.
+    // Transform along the rows, then along the columns of the result.
     let along = |plane: &[f64]| -> Vec<f64> {
         let pixels = (0..SIDE * SIDE).map(|i| (i / SIDE, i % SIDE));
         pixels
@@ -74,8 +74,8 @@ pub fn spectrum(image: &[f32]) -> Vec<f64> {
     along(&along(&plane)).iter().map(|c| c * c).collect()
 }
 
-/// Noise power over the expected one and number of coefficients, in rings of frequency; and the variance of a pixel,
-/// as it is and as the standard errors say, over that of white noise.
+/// Ratio of measured to expected noise power and number of coefficients, in rings of frequency; and the variance of a pixel,
+/// measured and according to the standard errors, relative to white noise.
 fn measured(images: &[Radiograph], blur: Option<&Blur>) -> ([(f64, f64); BANDS], [f64; 2]) {
     let mut bands = [(0.0, 0.0); BANDS];
     let [mut variance, mut stated] = [0.0; 2];
@@ -103,8 +103,8 @@ fn exposure(blur: Option<&Blur>) -> Projection {
     projection
 }
 
-/// Squares of normal numbers have a variance of 2: every ring within 4.5 standard errors (7e-6 each, 16 rings per engine:
-/// 1e-4), and `slack` for what the engine simplifies; so have the variance and what the standard errors say of it.
+/// Squares of normal variables have a variance of 2. Every ring agrees within 4.5 standard errors (7e-6 each, 16 rings per
+/// engine: 1e-4) plus `slack` for simplifications of the engine; so do the variance and the stated variance.
 fn assert_power(name: &str, images: &[Radiograph], blur: Option<&Blur>, slack: f64) {
     let (bands, [variance, stated]) = measured(images, blur);
     for (ring, (ratio, count)) in bands.into_iter().enumerate() {
@@ -125,14 +125,14 @@ fn assert_power(name: &str, images: &[Radiograph], blur: Option<&Blur>, slack: f
     let sum: f64 = of_waves.iter().sum();
     let error = (2.0 * squares / images.len() as f64).sqrt() / sum;
     let variance = variance / sum * (SIDE * SIDE) as f64;
-    // Standard errors know nothing of the mirror, beside which pixels share more.
+    // Standard errors ignore the mirror, next to which pixels share more.
     let stated = stated / powers(0.5).iter().sum::<f64>() * (SIDE * SIDE) as f64;
     println!("{name}: variance {variance:.3} ± {error:.3}, stated {stated:.4}");
     assert!(
         (variance - 1.0).abs() < 4.5 * error + 0.5 * slack,
         "{name}: variance is {variance:.3} ± {error:.3} of what it should be"
     );
-    // The squares of photons of one energy are known as well as their number: 1/√(16 x 200 000).
+    // For photons of one energy the squares are known as precisely as their number: 1/√(16 x 200 000).
     assert!(
         (stated - 1.0).abs() < 0.003 + 0.5 * slack,
         "{name}: stated variance is {stated:.4}"
@@ -171,7 +171,7 @@ fn noise_of_sharp_pixels_is_white() {
     assert_power("analog", &counted(None, 16), None, 0.0);
 }
 
-/// 2 % for the fit of the curve; 2 % more for photons that are spread over a square before they are counted.
+/// 2 % for the fit of the curve; 2 % more because photons are spread over a square before they are counted.
 #[test]
 fn noise_behind_blur_has_the_power_of_the_detector() {
     let blur = Some(&Blur::lorentzian(H_MM2));
@@ -179,7 +179,7 @@ fn noise_behind_blur_has_the_power_of_the_detector() {
     assert_power("analog", &counted(blur, 16), blur, 0.04);
 }
 
-/// As above, with the noise transfer in place of the MTF.
+/// As above, with the noise transfer instead of the MTF.
 #[test]
 fn noise_of_depth_dependent_blur_has_its_own_power() {
     let blur = lubberts();
@@ -188,10 +188,11 @@ fn noise_of_depth_dependent_blur_has_its_own_power() {
     assert_power("analog", &counted(blur, 16), blur, 0.04);
 }
 
-/// The edge of a field that covers half of the detector, mean over rows: both engines have the line spread of the MTF, not that of the noise, and the same standard errors.
+/// The edge of a field that covers half of the detector, averaged over rows: both engines have the line spread of the MTF, not that of the
+/// noise, and the same standard errors.
 ///
-/// Noise of a column is at most that of white noise: 64 columns at 4.5 standard errors, a false alarm in 2000 runs. Blurred by the noise transfer in
-/// place of the MTF, the column beside the edge would be 0.078 of the open field off.
+/// The noise of a column is at most that of white noise: 64 columns at 4.5 standard errors, a false alarm in 2000 runs. With the noise
+/// transfer instead of the MTF, the column at the edge would differ by 0.078 of the open field.
 #[test]
 fn signal_behind_depth_dependent_blur_keeps_its_mtf() {
     const FINE_MM: f64 = 0.1;
@@ -256,9 +257,9 @@ fn signal_behind_depth_dependent_blur_keeps_its_mtf() {
     }
 }
 
-/// ⟨E²⟩/⟨E⟩ of every category, the quantum that the fast engine's noise is made of: variance of the noise times
-/// histories over signal. Energies of photons spread by a fifth, so that the 3000 of the rarest category leave 0.4 %, and the
-/// estimate of the fast engine about as much: 1.5 % is some 3 standard errors.
+/// ⟨E²⟩/⟨E⟩ of every category, the quantum of the fast engine's noise: variance of the noise times histories over signal.
+/// Photon energies spread by a fifth, so the 3000 photons of the rarest category leave an error of 0.4 %, and the estimate of
+/// the fast engine about as much: 1.5 % is about 3 standard errors.
 #[test]
 fn quanta_of_every_category_are_those_of_analog() {
     let (phantom, spectrum, projection) =
@@ -267,7 +268,7 @@ fn quanta_of_every_category_are_those_of_analog() {
         .with_histories(1_000_000)
         .with_seed(21);
     let counted = analog(&phantom, &spectrum, &projection, &settings).unwrap();
-    // So few that the error of the scatter estimate is nothing beside the noise.
+    // Few enough that the error of the scatter estimate is negligible relative to the noise.
     let settings = FastSettings::default()
         .with_dose_histories(100.0)
         .with_scatter_histories(20_000)

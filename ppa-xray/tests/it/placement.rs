@@ -1,4 +1,4 @@
-//! Geometry and settings that make no sense are refused with the reason.
+//! Invalid geometry and settings are refused with the reason.
 
 use nalgebra::{Isometry3, Unit, Vector3};
 use ppa_xray::{
@@ -52,7 +52,7 @@ fn impossible_placements_are_named() {
     ));
 }
 
-/// Each in one clear sentence that names the number.
+/// Each message is one clear sentence that names the number.
 #[test]
 fn impossible_sources_and_receptors_are_named() {
     let field = |size_mm, centre_mm| Collimation::Rectangle { size_mm, centre_mm };

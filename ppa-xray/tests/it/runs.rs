@@ -1,4 +1,4 @@
-//! Long runs: parts, resumption, tallies in files, and when to stop.
+//! Long runs: parts, resuming, tally files and stopping criteria.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ impl Scene {
             .unwrap()
     }
 
-    /// The file of one part, followed to its end.
+    /// Runs one part to its end and returns its file.
     fn part(&self, part: &str, histories: u64, directory: &Path) -> PathBuf {
         let run = self.run(histories, 3);
         let mut tally = run.tally(part.parse().unwrap());
@@ -78,7 +78,7 @@ fn whole(scene: &Scene, histories: u64) -> AnalogTally {
     tally
 }
 
-/// Any partition in any order, interrupted or not, leaves the bytes of a run in one go.
+/// Any partition in any order, interrupted or not, gives the same bytes as a single run.
 #[test]
 fn parts_merge_to_the_bytes_of_one_run() {
     let (scene, directory) = (Scene::new(), tempfile::tempdir().unwrap());
@@ -147,7 +147,7 @@ fn an_interrupted_run_resumes_from_its_file() {
     assert_eq!(tally.radiograph(), whole(&scene, histories).radiograph());
     tally.write(&path).unwrap();
 
-    // A whole run continues to more histories, but not back to fewer.
+    // A complete run can be continued to more histories, but not to fewer.
     let more = scene.run(histories + 999, 3);
     let mut tally = more.read(&path, Part::WHOLE).unwrap();
     more.follow(&mut tally, &Stop::default(), |_, _| go_on())
@@ -222,7 +222,7 @@ fn overlap_hole_and_foreign_parts_are_refused_by_name() {
     assert!(matches!(error, TallyError::Unfinished { .. }), "{error}");
 }
 
-/// Differences that the key of a scene must reflect.
+/// Changes that the key of a scene must reflect.
 #[test]
 fn tallies_of_other_simulations_are_refused() {
     let (scene, directory) = (Scene::new(), tempfile::tempdir().unwrap());
@@ -314,7 +314,7 @@ fn files_that_are_no_tallies_are_refused_with_the_reason() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// No byte of the header or the sums can be changed unnoticed, and none makes the reader panic.
+    /// Every changed byte of the header or the sums is noticed, and none makes the reader panic.
     #[test]
     fn changed_bytes_are_noticed(at in 0.0..1.0_f64, in_header in any::<bool>(), byte in any::<u8>()) {
         static FILE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
@@ -355,7 +355,7 @@ fn a_time_limit_is_kept_and_leaves_a_complete_run() {
     assert_eq!(tally.done(), 0..tally.histories());
 }
 
-/// The histories at which a run is precise enough depend on the seed alone, and the error is what was asked for.
+/// The number of histories at which a run is precise enough depends on the seed alone, and the error is the requested one.
 #[test]
 fn an_interruption_does_not_change_the_last_history() {
     let scene = Scene::new();
@@ -370,7 +370,7 @@ fn an_interruption_does_not_change_the_last_history() {
         Stopped::Precise
     );
     let error = straight.relative_error();
-    // The error falls by 5 % at most from one look to the next.
+    // The error falls by at most 5 % from one check to the next.
     assert!((0.045..=0.05).contains(&error), "{error}");
 
     let image = straight.radiograph();
@@ -406,12 +406,11 @@ fn a_tally_of_another_run_is_refused_and_stays() {
     assert_eq!(ended, Ok(Stopped::Complete));
 }
 
-/// The reading of a blurred detector is the mean of several pixels and so more precise than one of them; electronic noise
-/// adds to its error.
+/// The reading of a blurred detector averages several pixels and so is more precise than one of them; electronic noise adds to its error.
 #[test]
 fn the_error_that_ends_a_run_is_that_of_the_image() {
     let mut scene = Scene::new();
-    // Beside the bone.
+    // Next to the bone.
     scene.projection.detector.pixel_mm = 0.2;
     scene.projection.detector.centre_mm = [27.0, 0.0];
     let error = |scene: &Scene| {

@@ -1,4 +1,4 @@
-//! Compton scattering off bound, moving electrons against profiles, limits and S(q).
+//! Compton scattering from bound, moving electrons against profiles, limits and S(q).
 
 use std::{collections::BTreeMap, fs};
 
@@ -22,7 +22,7 @@ pub fn uniforms(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// A material of one shell; its cross sections do not matter here.
+/// A material with a single shell; its cross sections do not matter here.
 fn one_shell(binding_kev: f64, profile_at_zero: f64) -> Material {
     let tables = PhotonTables {
         density_g_cm3: 1.0,
@@ -44,7 +44,7 @@ fn at_rest(energy_kev: f64, half: f64) -> f64 {
     energy_kev / (1.0 + 2.0 * energy_kev / ELECTRON_REST_KEV * half)
 }
 
-/// Unbound electrons that hardly move: the energy is that of Compton 1923, the mean cosine that of Klein and Nishina.
+/// Unbound, nearly motionless electrons: the energy is that of Compton 1923, the mean cosine that of Klein and Nishina.
 #[test]
 fn free_electrons_at_rest_give_klein_nishina() {
     // A profile 1e-5 times as wide as hydrogen's.
@@ -76,7 +76,7 @@ fn free_electrons_at_rest_give_klein_nishina() {
     }
 }
 
-/// An electron takes at least its binding energy away.
+/// An electron takes at least its binding energy from the photon.
 #[test]
 fn no_photon_keeps_more_than_the_binding_energy_leaves() {
     let tables = MaterialTables::new(&one_shell(4.0, 0.044), ComptonModel::ImpulseApproximation);
@@ -127,8 +127,8 @@ fn interpolated(momenta: &[f64], profile: &[f64], p: f64) -> f64 {
 
 /// Half of the photons of 60 keV that water scatters by 90° lie within the quartiles of its Compton profile.
 ///
-/// The profile of the reference (Biggs, Mendelsohn, Mann), not cut off by the binding energies, gives the distance of the
-/// quartiles in p, and dE′/dp at the Compton line its width in energy. The one-electron profiles of the sampler are exact at p = 0 only.
+/// The profile of the reference (Biggs, Mendelsohn, Mann), without the cut-off at the binding energies, gives the distance of the
+/// quartiles in p; dE′/dp at the Compton line converts it to energy. The one-electron profiles of the sampler are exact only at p = 0.
 #[test]
 #[ignore = "needs ../shared/reference/xray"]
 fn doppler_width_of_water_is_that_of_its_profile() {
@@ -159,7 +159,7 @@ fn doppler_width_of_water_is_that_of_its_profile() {
             quartile += step;
         }
         let line = at_rest(energy_kev, 0.5 - 0.5 * cos);
-        // dE′/dp = E′ q / E at the line, p along the momentum transfer q and in units of mₑc.
+        // dE′/dp = E′ q / E at the line, with p along the momentum transfer q and in units of mₑc.
         let q = (energy_kev.powi(2) + line.powi(2) - 2.0 * energy_kev * line * cos).sqrt();
         let expected = 2.0 * quartile / ATOMIC_MOMENTA_PER_MC * line * q / energy_kev;
         let mut uniform = uniforms(3);
@@ -173,13 +173,13 @@ fn doppler_width_of_water_is_that_of_its_profile() {
              median {:.3} keV, line {line:.3} keV",
             energies[100_000]
         );
-        // The width itself: 0.4 % by statistics. One-electron profiles and binding: within 8 %.
+        // Statistical error of the width: 0.4 %. With one-electron profiles and binding: within 8 %.
         assert!((width / expected - 1.0).abs() < 0.08, "{width} {expected}");
     }
 }
 
-/// Impulse approximation against Klein–Nishina × S(q): the same mean cosine to half a hundredth, and from 30° on the same density
-/// per solid angle to 4 %. At 10° they differ by up to 37 %, where both have next to nothing.
+/// Impulse approximation against Klein–Nishina × S(q): the mean cosines agree to 0.005, and from 30° on the densities per solid
+/// angle to 4 %. At 10°, where both are close to zero, they differ by up to 37 %.
 #[test]
 fn both_models_have_nearly_the_same_angles() {
     println!(

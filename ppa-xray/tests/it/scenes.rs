@@ -1,4 +1,4 @@
-//! Small scenes that several tests look at.
+//! Small scenes shared by several tests.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_ct::Grid;
@@ -7,7 +7,7 @@ use ppa_xray::{
     VoxelPhantom,
 };
 
-/// Device axes along ct axes, source 1 m before the ct origin.
+/// Device axes along the ct axes, source 1 m in front of the ct origin.
 pub fn frontal(pixels: u32, pixel_mm: f64) -> Projection {
     Projection::new(
         Isometry3::translation(0.0, 0.0, -1_000.0),
@@ -33,7 +33,7 @@ pub fn slab(thickness_mm: f64, density_g_cm3: f32) -> VoxelPhantom {
     .unwrap()
 }
 
-/// A tilted limb of uneven density with bone and a titanium pin, voxels of unequal sides.
+/// A tilted limb of non-uniform density with bone and a titanium pin, in anisotropic voxels.
 pub fn limb(pose: &Isometry3<f64>) -> VoxelPhantom {
     let size = [36, 30, 40];
     let tilt = Isometry3::from_parts(

@@ -1,8 +1,8 @@
-//! Where the reference data lies.
+//! Location of the reference data.
 
 use std::path::PathBuf;
 
-/// A file of the shared data: beside the repository, or under `PPA_SHARED`.
+/// Path of a file of the shared data: next to the repository, or under `PPA_SHARED`.
 pub fn path(relative: &str) -> PathBuf {
     std::env::var_os("PPA_SHARED")
         .map_or_else(

@@ -10,7 +10,7 @@ use crate::shared;
 /// Mean energy (keV), HVL1, HVL2 (mm Al), fluence (1/(mAs cm²)), air kerma (µGy/mAs), both at 1 m.
 type Quality = [f64; 5];
 
-/// Largest relative differences that pass: mean energy, HVL1, HVL2, fluence, kerma.
+/// Largest permitted relative differences: mean energy, HVL1, HVL2, fluence, kerma.
 const TOLERANCE: Quality = [0.01, 0.02, 0.02, 0.02, 0.02];
 
 fn quality(kvp: f64, anode_angle_deg: f64, filters: &str) -> Quality {
@@ -185,7 +185,7 @@ fn reference_spectra_agree_with_spekpy() {
             file.replace("csv", "spc")
         )))
         .unwrap();
-        // The very same photons: what is left is the attenuation of aluminium and the energy transfer of air.
+        // The same photons: only the attenuation of aluminium and the energy transfer of air can differ.
         for read in [csv, spc] {
             assert!((read.mean_energy_kev() / reference[0] - 1.0).abs() < 1e-3);
             let difference = read.hvl1_mm_al() / reference[1] - 1.0;

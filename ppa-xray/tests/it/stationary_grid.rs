@@ -1,4 +1,4 @@
-//! Lines of a stationary grid: both engines against each other, against the moving grid and against the Fourier series of strips.
+//! Lines of a stationary grid: both engines against each other, the moving grid and the Fourier series of the strips.
 
 use std::f64::consts::PI;
 
@@ -33,7 +33,7 @@ fn expected(projection: &Projection) -> Radiograph {
     fast(&slab(10.0, 1e-9), &spectrum, projection, &settings).unwrap()
 }
 
-/// Means over the lines of pixels across the strips.
+/// Means of the lines of pixels, in order across the strips.
 fn across(values: &[f32], lines_along: LinesAlong) -> Vec<f64> {
     let mean = |place: usize| {
         let pixel = |i: usize| match lines_along {
@@ -56,7 +56,8 @@ fn amplitude(values: &[f64], cycles: f64) -> f64 {
     2.0 * re.hypot(im) / values.iter().sum::<f64>()
 }
 
-/// Lines of pixels within 5 standard errors and `slack` of the open field: 80 lines, a false alarm in 2e4 runs; χ² of the lines where they are independent.
+/// Lines of pixels agree within 5 standard errors and `slack` of the open field (80 lines, a false alarm in 2e4 runs); also checks the χ²
+/// of the lines where they are independent.
 fn assert_engines_agree(name: &str, projection: &Projection, slack: f64) {
     let histories = 2_000_000;
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
@@ -67,7 +68,7 @@ fn assert_engines_agree(name: &str, projection: &Projection, slack: f64) {
     let [found, expected] =
         [&counted, &model].map(|image| across(&image.total(), grid.lines_along));
     let open = model.open_field_ev_cm2;
-    // Photons that pass, each with its whole energy.
+    // Transmitted photons deposit their full energy.
     let pixel_cm2 = (projection.detector.pixel_mm / 10.0).powi(2);
     let ev_cm2 = 60e3 / pixel_cm2;
     let mut chi2 = 0.0;
@@ -98,7 +99,7 @@ fn assert_engines_agree(name: &str, projection: &Projection, slack: f64) {
     }
 }
 
-/// Sharp pixels: a grid at its focal distance, one without focus beside the axis, where strips shade spaces, and one along the other axis.
+/// Sharp pixels: a grid at its focal distance, an unfocused one off the axis, where strips shade spaces, and one along the other axis.
 #[test]
 fn engines_agree_on_every_line_of_sharp_pixels() {
     assert_engines_agree("focused", &exposure(0.1, stationary(), None), 0.0);
@@ -109,7 +110,8 @@ fn engines_agree_on_every_line_of_sharp_pixels() {
     assert_engines_agree("along x", &exposure(0.15, along_x, None), 0.0);
 }
 
-/// Strips as wide as spaces have no second harmonic, which pixels of 0.1 mm would not resolve. 1 % for the fit of the curve and the blur of counted photons.
+/// Strips as wide as the spaces have no second harmonic, which pixels of 0.1 mm would not resolve. 1 % covers the fit of the curve and the
+/// blur of counted photons.
 #[test]
 fn engines_agree_on_lines_behind_blur() {
     let even = stationary().with_strip_mm(0.125);
@@ -117,8 +119,8 @@ fn engines_agree_on_lines_behind_blur() {
     assert_engines_agree("blurred", &exposure(0.1, even, blur), 0.01);
 }
 
-/// Strips of opaque lead have the coefficients −sin(π m d/p)/π m; pixels take sinc, the converter 1/(1 + H f²). 40 lines per cm in pixels of 0.15 mm are seen as |4 − 6.67| = 2.67 per mm,
-/// 0.4 per pixel, with the harmonics 4, 6, 9, … whose alias is the same; nothing is as strong.
+/// Opaque lead strips have the coefficients −sin(π m d/p)/π m; pixels multiply them by sinc, the converter by 1/(1 + H f²). 40 lines per cm
+/// in pixels of 0.15 mm alias to |4 − 6.67| = 2.67 per mm, 0.4 per pixel, as do the harmonics 4, 6, 9, …; this is the strongest wave.
 #[test]
 fn moire_has_frequency_and_amplitude_of_the_alias() {
     let sinc = |x: f64| (PI * x).sin() / (PI * x);
@@ -144,13 +146,13 @@ fn moire_has_frequency_and_amplitude_of_the_alias() {
         let expected = waves.sum::<f64>().abs();
         let found = strength(largest);
         println!("H {h_mm2} mm²: amplitude {found:.4}, expected {expected:.4}");
-        // The curve is fitted to 0.012; without blur the strips let 1e-4 through.
+        // The curve is fitted to 0.012; without blur the strips transmit 1e-4.
         let fit = if h_mm2 > 0.0 { 0.013 * 0.236 } else { 1e-3 };
         assert!((found - expected).abs() < fit, "{found}, {expected}");
     }
 }
 
-/// 5 pixels of 0.1 mm hold 2 periods: their mean is that of a moving grid, whatever the strips let through.
+/// 5 pixels of 0.1 mm hold 2 periods: their mean is that of a moving grid, whatever the transmission of the strips.
 #[test]
 fn whole_periods_have_the_mean_of_a_moving_grid() {
     let thin = stationary()
@@ -175,7 +177,7 @@ fn whole_periods_have_the_mean_of_a_moving_grid() {
     }
 }
 
-/// Behind a grid at rest the open field is that of a moving one, so indices and presentations are too.
+/// A stationary grid has the open field of a moving one, and so the same indices and presentations.
 #[test]
 fn open_field_is_that_of_a_moving_grid() {
     let still = expected(&exposure(0.15, stationary(), None));

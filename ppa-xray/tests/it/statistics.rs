@@ -1,4 +1,4 @@
-//! Standard errors are what they say.
+//! Standard errors match the observed scatter.
 
 use nalgebra::Isometry3;
 use ppa_xray::{AnalogSettings, Category, Radiograph, analog};
@@ -22,7 +22,7 @@ fn images(histories: u64) -> Vec<Radiograph> {
         .collect()
 }
 
-/// Scatter of values about their mean over their mean stated variance: χ² over its degrees of freedom.
+/// Variance of the values about their mean over their mean stated variance: χ² per degree of freedom.
 fn reduced_chi2(values: &[(f64, f64)]) -> f64 {
     let n = values.len() as f64;
     let mean = values.iter().map(|(value, _)| value).sum::<f64>() / n;
@@ -31,8 +31,8 @@ fn reduced_chi2(values: &[(f64, f64)]) -> f64 {
     scatter / stated / (n - 1.0)
 }
 
-/// 23 degrees of freedom each; sums of a category leave 0.30 to 2.3 once in 1e4 at either end, the mean over 64 pixels
-/// (1472 degrees) leaves 0.85 to 1.16 once in 3e4.
+/// 23 degrees of freedom each; sums of a category fall outside 0.30 to 2.3 once in 1e4 at either end, the mean over 64
+/// pixels (1472 degrees) falls outside 0.85 to 1.16 once in 3e4.
 #[test]
 fn seeds_scatter_as_the_standard_error_says() {
     let images = images(20_000);
@@ -61,8 +61,8 @@ fn seeds_scatter_as_the_standard_error_says() {
     assert!((0.85..1.16).contains(&mean), "pixels: χ²/n = {mean:.3}");
 }
 
-/// Nine times the histories, a third of the error: stated (to 3 %) and in fact (64 x 23 degrees of freedom: the ratio of
-/// two variances leaves 9 ± 1.7 once in 1e5).
+/// Nine times the histories give a third of the error: as stated (to 3 %) and as observed (64 x 23 degrees of freedom: the
+/// ratio of two variances falls outside 9 ± 1.7 once in 1e5).
 #[test]
 fn the_error_falls_as_one_over_the_root_of_the_histories() {
     let (few, many) = (images(8_000), images(72_000));

@@ -1,6 +1,6 @@
 //! Cases of AAPM Report 195 (Sechopoulos et al., Med. Phys. 42 (2015) 5679): means of EGSnrc, Geant4, MCNP and PENELOPE.
 //!
-//! What the shared reference does not hold is written out here, as the public validation programme of DXMClib lists it.
+//! Values missing in the shared reference are written out here, as listed by the public validation programme of DXMClib.
 
 mod case_2;
 mod case_3;
@@ -80,7 +80,7 @@ fn dose(
     tally.dose().unwrap()
 }
 
-/// Within `tolerance`, give or take two standard errors.
+/// Agrees within `tolerance` plus two standard errors.
 fn assert_close(what: &str, found: Estimate, expected: f64, tolerance: f64) {
     let off = found.value / expected - 1.0;
     println!(
@@ -91,7 +91,7 @@ fn assert_close(what: &str, found: Estimate, expected: f64, tolerance: f64) {
     );
     let allowed = tolerance + 2.0 * found.se / expected;
     assert!(off.abs() < allowed, "{what}: {:+.2} % off", 100.0 * off);
-    // Else the tolerance would say nothing.
+    // Otherwise the tolerance would be meaningless.
     assert!(
         found.se < 1.5 * tolerance * expected,
         "{what}: se {}",
@@ -101,7 +101,7 @@ fn assert_close(what: &str, found: Estimate, expected: f64, tolerance: f64) {
 
 /// Case 1: aluminium of the half and the quarter value layer halves and quarters the air kerma at 1 m.
 ///
-/// Narrow beam, so the answer is an integral: through 1 m of air, and through aluminium in front of it. Cross sections of
+/// In a narrow beam the answer is an integral: through 1 m of air, and through aluminium in front of it. Cross sections of
 /// other codes may differ by 1 %.
 #[test]
 #[ignore = "needs ../shared/reference/xray"]

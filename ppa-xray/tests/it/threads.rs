@@ -1,4 +1,4 @@
-//! Exposures that several threads compute at once.
+//! Exposures computed by several threads at once.
 
 use std::hint::black_box;
 use std::sync::mpsc;
@@ -13,7 +13,7 @@ use ppa_xray::{
 };
 use rayon::prelude::*;
 
-/// Threads of the pool; more than a machine has cores do no harm.
+/// Threads of the pool; more than the machine has cores is harmless.
 const THREADS: usize = 8;
 
 struct Scene {
@@ -52,7 +52,7 @@ fn ends(rounds: usize, round: impl Fn() + Send + Sync + 'static) {
         .expect("the threads wait for each other");
 }
 
-/// Some other work whose parts end at different times, so that some threads wait for work while others begin to expose.
+/// Other work whose parts end at different times, so that some threads wait while others start an exposure.
 fn uneven_work(item: usize) {
     let steps = item * 7919 % 13 * 200_000;
     let parts = (0..40).into_par_iter().map(|part| {
@@ -63,7 +63,7 @@ fn uneven_work(item: usize) {
     black_box(parts.reduce(|| 0, |a, b| a ^ b));
 }
 
-/// Tables made by the first exposure, in a locked cell, stopped the first or second round in two of three runs.
+/// When the first exposure made the tables in a locked cell, the first or second round deadlocked in two of three runs.
 #[test]
 fn threads_share_a_prepared_phantom_without_deadlock() {
     let scene = scene();
@@ -81,7 +81,7 @@ fn threads_share_a_prepared_phantom_without_deadlock() {
     });
 }
 
-/// Bounds made by the first history, in a locked cell, stopped the 14th and the 26th round.
+/// When the first history made the bounds in a locked cell, the 14th and the 26th round deadlocked.
 #[test]
 fn threads_follow_analog_histories_without_deadlock() {
     let scene = scene();

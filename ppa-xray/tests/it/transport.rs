@@ -1,4 +1,4 @@
-//! Transport against answers that can be derived.
+//! Transport against analytical results.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use ppa_xray::{AnalogSettings, Category, FastSettings, Material, Spectrum, analog, fast, primary};
@@ -24,7 +24,7 @@ fn slab_follows_beer_lambert() {
     let histories = 200_000_u64;
     let mu_per_mm = Material::named("water").unwrap().total_cm2_g(60.0).unwrap() / 10.0;
     let p = f64::exp(-mu_per_mm * 100.0);
-    // A field of 10 mm at 1.1 m: slant paths are longer by 1e-5 at most.
+    // A field of 10 mm at 1.1 m: oblique paths are longer by at most 1e-5.
     let image = analog(
         &slab(100.0, 1.0),
         &Spectrum::monoenergetic(60.0).unwrap(),
@@ -66,7 +66,7 @@ fn nothing_in_the_beam_brings_all_energy_to_the_detector() {
         assert!((image.open_field_at(pixel) / value - 1.0).abs() < 1e-4);
     }
 
-    // Even in solid angle means cos³θ on the plane: 2.7 % less at 150 mm from the centre than in it.
+    // Uniform in solid angle means cos³θ on the plane: 2.7 % less at 150 mm from the centre than at it.
     let rim: Vec<usize> = (0..traced.len())
         .filter(|pixel| (pixel % 60).abs_diff(30).max((pixel / 60).abs_diff(30)) > 26)
         .collect();
@@ -86,7 +86,7 @@ fn tallied_and_ray_traced_primary_agree_pixel_by_pixel() {
     let tallied = analog(&phantom, &spectrum, &projection, &settings(histories, 5)).unwrap();
     let traced = primary(&phantom, &spectrum, &projection, 16).unwrap();
     let layer = tallied.layer(Category::Primary);
-    // The error bar of a dark pixel is known well only if it caught photons: leave out the few that did not.
+    // The error bar of a dark pixel is reliable only if it caught photons: leave out the few that did not.
     let z2: Vec<f64> = traced
         .iter()
         .zip(layer.value.iter().zip(&layer.sigma))
@@ -123,7 +123,7 @@ fn turning_phantom_and_device_together_changes_nothing() {
     for (a, b) in a.iter().zip(&b) {
         assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
     }
-    // The same random numbers: only histories that rounding sends another way may differ.
+    // The same random numbers: only histories changed by rounding may differ.
     let a = analog(&here, &spectrum, &before, &settings(50_000, 7)).unwrap();
     let b = analog(&there, &spectrum, &after, &settings(50_000, 7)).unwrap();
     let (a, b) = (a.sums.total_ev_per_history(), b.sums.total_ev_per_history());

@@ -1,6 +1,6 @@
-//! Writes the corpus that fuzzing begins with: `fuzz_seeds FOLDER` makes a folder for each target, with a few valid files each.
+//! Writes the initial fuzzing corpus: `fuzz_seeds FOLDER` makes a folder for each target, with a few valid files each.
 //!
-//! Not a program of `fuzz/`, where everything is compiled for the fuzzer.
+//! Not part of `fuzz/`, where everything is compiled for the fuzzer.
 
 mod streams;
 mod texts;
@@ -13,12 +13,12 @@ use nalgebra::{Point3, Vector3};
 use ppa_ct::{Grid, Volume};
 use ppa_depth::{CameraSpec, DepthMode};
 
-/// What the targets of codecs take: columns, rows, 1 for 8 bits, and the frame.
+/// Input of the codec targets: columns, rows, 1 for 8 bits, and the frame.
 fn frame(size: [u8; 2], bits: u8, frame: &[u8]) -> Vec<u8> {
     [&[size[0], size[1], u8::from(bits == 8)], frame].concat()
 }
 
-/// What takes a file's kind from its first byte.
+/// Input of targets that take the kind of file from the first byte.
 fn tagged(kind: u8, bytes: impl AsRef<[u8]>) -> Vec<u8> {
     [&[kind], bytes.as_ref()].concat()
 }
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The camera as its JSON.
+/// The camera as JSON.
 fn serde_text(camera: &CameraSpec) -> String {
     serde_json::to_string(camera).expect("a camera is JSON")
 }
@@ -80,7 +80,7 @@ fn volumes(corpus: &Corpus, work: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A frame of 8 x 8 pixels by every codec.
+/// A frame of 8 x 8 pixels compressed by every codec.
 fn frames(corpus: &Corpus) -> Result<(), Box<dyn Error>> {
     let pixels: Vec<u8> = (0..64).map(|n| 4 * n).collect();
     let grey = libjpeg_turbo_rs::PixelFormat::Grayscale;

@@ -1,6 +1,6 @@
-//! Compressed frames for which no encoder is at hand.
+//! Compressed frames for which no encoder is available.
 
-/// 8 x 8 pixels of 16 bits in two runs for each byte.
+/// 8 x 8 pixels of 16 bits, with two runs for each byte.
 pub fn rle() -> Vec<u8> {
     let segment = [0xc1, 3, 0x80]; // 64 times 3, and a code without meaning
     let starts = [2_u32, 64, 64 + segment.len() as u32];
@@ -18,7 +18,7 @@ pub fn jpeg_ls() -> Vec<u8> {
     (0..STREAM.len()).step_by(2).map(byte).collect()
 }
 
-/// A JPEG 2000 codestream of one tile with `side` x `side` pixels of 8 bits, of which the only packet is empty.
+/// A JPEG 2000 codestream of one tile with `side` x `side` pixels of 8 bits, whose only packet is empty.
 pub fn jpeg_2000(side: u32) -> Vec<u8> {
     let segment = |marker: u8, body: &[u8]| {
         let length = (body.len() as u16 + 2).to_be_bytes();

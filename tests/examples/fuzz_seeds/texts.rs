@@ -1,6 +1,6 @@
-//! Text files of every kind: target, name, kind where the target takes several, and content.
+//! Text files of every kind: target, name, kind if the target takes several, and content.
 
-/// A calibration as an Azure Kinect holds it, with numbers of its public software's tests.
+/// A calibration as stored in an Azure Kinect, with numbers from the tests of its public software.
 const DEVICE: &str = r#"{"CalibrationInformation": {"Cameras": [
     {"Purpose": "CALIBRATION_CameraPurposeDepth", "MetricRadius": 1.737323045730591, "SensorWidth": 1024,
      "Intrinsics": {"ModelType": "CALIBRATION_LensDistortionModelBrownConrady", "ModelParameterCount": 14,

@@ -1,4 +1,4 @@
-//! Declarations of types that serde reads or writes, parsed from sources as rustfmt leaves them.
+//! Parses declarations of types that serde reads or writes from sources formatted by rustfmt.
 
 /// A field or a variant.
 #[derive(Default)]
@@ -119,7 +119,7 @@ pub fn items(lines: &[&str]) -> Vec<Item> {
     items
 }
 
-/// What a variant is called in files.
+/// The name of a variant in files.
 pub fn variant_name(ty: &Type, variant: &Item) -> String {
     match value(&variant.attributes, "rename") {
         Some(name) => name.to_owned(),

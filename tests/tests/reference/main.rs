@@ -1,6 +1,6 @@
-//! The reference pages list every key of the files that users write or read, as the types in the sources declare them.
+//! The reference pages list every key of the files that users write or read, as declared by the types in the sources.
 //!
-//! The sources are read as text, as rustfmt leaves them, so that no crate needs a feature or a dependency for its documentation.
+//! The sources are read as text formatted by rustfmt, so no crate needs a feature or a dependency for its documentation.
 
 mod declarations;
 mod page;
@@ -67,7 +67,7 @@ const PAGES: &[Page] = &[
     ),
 ];
 
-/// Fails unless a file has this text; writes it first where `PPA_WRITE_REFERENCE` is set.
+/// Fails unless a file contains this text; writes it first if `PPA_WRITE_REFERENCE` is set.
 fn require_current(path: &Path, text: &str) {
     if std::env::var_os("PPA_WRITE_REFERENCE").is_some() {
         fs::write(path, text).unwrap();
@@ -90,7 +90,7 @@ fn reference_pages_are_those_of_the_types() {
     }
 }
 
-/// The form of `ppa studio` for plans is made from this file: key, type, meaning, and names with their meanings.
+/// `ppa studio` makes its form for plans from this file: key, type, meaning, and names with their meanings.
 #[test]
 fn the_form_of_plans_has_the_keys_of_the_types() {
     let plan: Page = ("plan.md", "", &PAGES[0].2[..1]);

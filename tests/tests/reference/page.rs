@@ -6,32 +6,32 @@ use std::fmt::Write as _;
 use super::declarations::{Item, Type, value, variant_name};
 use super::sources::Sources;
 
-/// A page: its file, title, introduction, and the types at the root of each file with the key they stand under.
+/// A page: its file, title, introduction, and the root types of each file with their keys.
 pub type Page = (&'static str, &'static str, &'static [Root]);
 /// Heading, file that declares the type, the type.
 pub type Root = (&'static str, &'static str, &'static str);
 
-/// A page as it grows.
+/// A page under construction.
 pub struct Table {
     pub text: String,
     pub keys: BTreeSet<String>,
     /// Rows without markup.
     pub rows: Vec<Row>,
-    /// Whether ppa writes the files and no person does.
+    /// Whether the files are written by ppa rather than by users.
     pub is_written: bool,
 }
 
-/// A key, what it holds, and what it is for.
+/// A key with its type and meaning.
 pub struct Row {
     pub key: String,
     pub kind: String,
     pub meaning: String,
-    /// The names that it may have, with what each of them means.
+    /// The allowed names with their meanings.
     pub names: Vec<(String, String)>,
 }
 
 impl Sources {
-    /// Rows of the table for the fields of a type, those of the types below it included.
+    /// Rows of the table for the fields of a type, including those of nested types.
     pub fn rows(&self, ty: &Type, prefix: &str, page: &mut Table) {
         let other = if page.is_written { "into" } else { "try_from" };
         let ty = value(&ty.item.attributes, other)
@@ -170,7 +170,7 @@ impl Sources {
     }
 }
 
-/// The type in words of TOML and JSON; `named` says what a type of ours is.
+/// The type in words of TOML and JSON; `named` describes a type of this workspace.
 pub fn kind(ty: &str, named: &str) -> String {
     let inner = |start: &str| {
         ty.strip_prefix(start)

@@ -1,4 +1,4 @@
-//! The sources of all crates: which type a name denotes in a file, and its defaults.
+//! Sources of all crates: resolves type names used in a file, and their defaults.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ impl Sources {
         &self.texts.iter().find(|(name, _)| name == file).unwrap().1
     }
 
-    /// The type that a file means by a name: its own, that of a crate it imports the name from, or one of its own crate.
+    /// Resolves a type name in a file: a type of the file itself, of a crate it imports the name from, or of its own crate.
     pub fn find(&self, file: &str, name: &str) -> Option<&Type> {
         let named: Vec<_> = self
             .types
@@ -73,7 +73,7 @@ impl Sources {
             .copied()
     }
 
-    /// The default that `impl Default` gives a field, where it is a plain value.
+    /// The default that `impl Default` gives a field, if it is a plain value.
     pub fn default_of(&self, ty: &Type, field: &str) -> Option<String> {
         let text = self.text(&ty.file);
         let body = text
@@ -99,7 +99,7 @@ impl Sources {
         (!plain.is_empty() && !plain.contains(['(', ':', '\n'])).then_some(plain)
     }
 
-    /// The default of a type, as `Default` has it.
+    /// The default of a type as given by `Default`.
     pub fn plain_default(&self, shown: &str, ty: Option<&Type>) -> String {
         match (shown, ty) {
             ("f64" | "f32" | "u32" | "u64" | "usize" | "i32", _) => "`0`".to_owned(),

@@ -21,10 +21,10 @@ impl Case {
     }
 }
 
-/// At 0° or, with the source moved in y, at 15° to the middle of the detector, which the beam fills in both.
+/// The beam is at 0° or, with the source moved in y, at 15° to the middle of the detector, which it fills in both cases.
 ///
-/// The phantom holds the air from 1 cm behind the source to the detector, but none beside the field, where only photons
-/// come that have left the box. The four cubes beside the middle are alike at 0°; together their standard error is half.
+/// The phantom contains the air from 1 cm behind the source to the detector, but none outside the field, where only photons
+/// that have left the box arrive. The four cubes around the middle are equivalent at 0°; together their standard error is half.
 fn case_2(spectrum_name: &str, angle_deg: f64, expected: &Case) {
     let reference = reference();
     let voxel_mm = 5.0;
@@ -80,7 +80,7 @@ fn case_2(spectrum_name: &str, angle_deg: f64, expected: &Case) {
         let what = format!("cube {}", index + 1);
         assert_close(&what, imparted(index + 1), expected, 0.02);
     }
-    // At 15° cubes 1 and 5 lie on the side of the source and on the other.
+    // At 15° cubes 1 and 5 are on the source side and on the opposite side.
     let beside: &[usize] = if angle_deg == 0.0 {
         &[1, 2, 4, 5]
     } else {

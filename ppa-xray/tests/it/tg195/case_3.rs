@@ -28,7 +28,7 @@ pub fn mo_30_kvp() -> Spectrum {
 }
 
 /// Voxels of 2 mm x 2 mm x 1 mm; z from the source towards the detector, with the middle of the breast at 62 cm. Half discs of
-/// 10 cm radius, 2 mm of skin on all sides but the chest wall; paddles of PMMA above and below; a body of water behind the
+/// 10 cm radius, 2 mm of skin on all sides except the chest wall; paddles of PMMA above and below; a body of water behind the
 /// wall. Air fills the rest of a box from 1 cm behind the source to the end of the body.
 fn breast() -> VoxelPhantom {
     let reference = reference();
@@ -78,7 +78,7 @@ fn region(low_mm: [f64; 3], high_mm: [f64; 3]) -> VoxelBox {
     }
 }
 
-/// Volumes of 2 cm x 2 cm x 1 cm. Those beside the middle, 1 and 5, are alike by symmetry.
+/// Volumes of 2 cm x 2 cm x 1 cm. Volumes 1 and 5, on either side of the middle, are equivalent by symmetry.
 fn case_3(name: &str, spectrum: &Spectrum, whole: f64, volumes: [f64; 7]) {
     let centres_mm = [
         [50.0, -50.0, 620.0],

@@ -5,9 +5,9 @@ use ppa_xray::{Collimation, Detector, Estimate, Projection, Source, VoxelBox, Vo
 
 use super::{assert_close, dose, grid, material, numbers, reference, spectrum};
 
-/// The source turns about the cylinder, whose whole discs do not notice, so one direction is enough. The cylinder is cut
-/// into voxels of 2 mm and at 50.5 cm from the fan instead of 150 cm, from where next to nothing returns; the
-/// air between source and cylinder is there, that beside it is not.
+/// The source rotates about the cylinder; complete discs are symmetric, so one direction is enough. The cylinder has voxels
+/// of 2 mm and is cut at 50.5 cm from the fan instead of 150 cm, from where almost nothing returns. The air between source
+/// and cylinder is included, that around it is not.
 fn case_4_1(spectrum_name: &str, slit_mm: f64, expected: [f64; 4]) {
     let reference = reference();
     let grid = grid([-160.0, -505.0, 10.0], [2.0, 10.0, 2.0], [160, 101, 375]);
@@ -30,7 +30,7 @@ fn case_4_1(spectrum_name: &str, slit_mm: f64, expected: [f64; 4]) {
         size_mm: [320.0, slit_mm].map(|side| side * detector_mm / isocentre_mm),
         centre_mm: [0.0; 2],
     });
-    // Three discs on either side of that in the middle.
+    // Three discs on either side of the middle one.
     let disc = |cm: i32| VoxelBox {
         low: [0, (50 + cm) as usize, 215],
         high: [160, (51 + cm) as usize, 375],
