@@ -9,10 +9,10 @@ use std::sync::LazyLock;
 use dicom::dicom_file;
 use ppa_ct::ReadOptions;
 use ppa_dataset::labels::LabelFile;
-use ppa_label::{import_grades, read_key};
 use ppa_dataset::layout::{LimbId, Side};
 use ppa_dataset::published::Published;
 use ppa_dataset::{Manifest, Split};
+use ppa_label::{import_grades, read_key};
 
 /// One folder per process; its files are overwritten in every run.
 static FOLDER: LazyLock<PathBuf> =
