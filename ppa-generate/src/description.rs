@@ -28,9 +28,9 @@ pub(crate) struct Settings {
     seed: u64,
     /// Body shapes.
     shapes: ShapeSettings,
-    /// How deeply heel and calf are indented where they rest on the table.
+    /// Indentation of heel and calf where they rest on the table.
     soft_tissue: SoftTissue,
-    /// Errors of positioning; left out if there are none.
+    /// Positioning errors; left out if there are none.
     #[serde(skip_serializing_if = "Positioning::is_default")]
     positioning: Positioning,
     /// SHA-256 of the point cloud of a recorded room; `null` for the built-in one.
@@ -51,7 +51,7 @@ pub(crate) struct Settings {
     /// Errors of the cameras' sensors; left out for ideal images.
     #[serde(skip_serializing_if = "Option::is_none")]
     sensor: Option<SensorSpec>,
-    /// What a camera sees where the field of view of the scan cuts the limb off.
+    /// Depth where the field of view of the scan cuts the limb off.
     cut_faces: WallDepth,
     /// How radiographs are made. `max_cut_share`, which changes no image, is left out.
     xray: XraySettings,

@@ -18,15 +18,15 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
     ),
     (
         "[shapes]",
-        "Body shapes: the skin of the scan and changed ones.",
+        "Body shapes: the skin of the scan and variants of it.",
     ),
     (
         "[soft_tissue]",
-        "How deeply heel and calf are indented where they rest; 0 is a rigid skin.",
+        "Indentation of heel and calf where they rest; 0 is a rigid skin.",
     ),
     (
         "[positioning]",
-        "Errors of positioning; by default the joint lies on the central beam.",
+        "Positioning errors; by default the joint is on the central beam.",
     ),
     (
         "[room]",
@@ -38,17 +38,20 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
     ),
     ("[depth]", "Depth images of both cameras."),
     ("[xray]", "Radiographs."),
-    ("[xray.source]", "Where photons start, and where they go."),
+    ("[xray.source]", "Focal spot, heel effect and collimation."),
     ("[xray.source.focal_spot]", ""),
     ("[xray.detector]", "Pixels of the radiograph."),
-    ("[xray.receptor]", "What the detector makes of photons."),
+    (
+        "[xray.receptor]",
+        "Anti-scatter grid and converter of the detector.",
+    ),
     (
         "[xray.engine]",
-        "How much is computed; the plan's seed decides, not this one.",
+        "The fast engine; the seed of the plan applies, not this one.",
     ),
     (
         "[xray.analog]",
-        "Analog Monte Carlo, which makes the radiographs in place of [xray.engine].",
+        "Analog Monte Carlo, in place of [xray.engine].",
     ),
     (
         "[xray.presentation]",
@@ -60,8 +63,8 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
 /// Meaning of each key, by table and key.
 pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     ("", "version", "format of this file"),
-    ("", "seed", "of all random numbers"),
-    ("case", "file", "what `ppa prepare` wrote"),
+    ("", "seed", "seed of all random numbers"),
+    ("case", "file", "case file written by `ppa prepare`"),
     (
         "case",
         "patient",
@@ -71,7 +74,7 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     (
         "shapes",
         "offset_mm",
-        "big is the skin moved out by this, small in",
+        "offset of big outwards and of small inwards",
     ),
     ("shapes", "bumps", "bumps of bumps_a and of bumps_b"),
     (
@@ -194,7 +197,11 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
         "dose_histories",
         "whose quantum noise the image has; inf: no noise",
     ),
-    ("xray.engine", "scatter_histories", "followed for scatter"),
+    (
+        "xray.engine",
+        "scatter_histories",
+        "histories followed for scatter",
+    ),
     (
         "xray.engine",
         "scatter_pixel_mm",
@@ -203,12 +210,12 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     (
         "xray.engine",
         "samples_per_side",
-        "rays per pixel side at edges, at most",
+        "largest number of rays per pixel side, at edges",
     ),
     (
         "xray.engine",
         "compton_model",
-        "how photons scatter off electrons",
+        "model of Compton scattering",
     ),
     ("xray.engine", "seed", "must be 0"),
     (
@@ -219,7 +226,7 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     (
         "xray.analog",
         "compton_model",
-        "how photons scatter off electrons",
+        "model of Compton scattering",
     ),
     ("xray.analog", "seed", "must be 0"),
     (
@@ -235,12 +242,12 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     (
         "xray.presentation",
         "latitude_reduction",
-        "large areas lose contrast by 1 + this x log exposure",
+        "contrast of large areas is divided by 1 + this x log exposure",
     ),
     (
         "xray.presentation",
         "detail",
-        "contrast of faint detail that is added",
+        "share by which the contrast of faint detail is increased",
     ),
 ];
 
@@ -254,7 +261,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
         "room",
         &[
             "#ply = \"recorded.ply\"    # a recorded room in place of the built-in furniture",
-            "#room_from_device = [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1040], [0, 0, 0, 1]]    # in it: row-major 4x4",
+            "#room_from_device = [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1040], [0, 0, 0, 1]]    # pose of the device in it: row-major 4x4",
         ],
     ),
     (
@@ -287,7 +294,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
             "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
             "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid; with moving = false the image shows its lines",
             "#gain_error = 0.01    # relative standard deviation of the pixels' gains after calibration",
-            "#panel = 1    # serial number of the panel; 0 when left out; each has its own pattern of gains",
+            "#panel = 1    # serial number of the panel; 0 by default; each has its own pattern of gains",
             "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter; add noise_h_mm2 = 0.3 for noise that is blurred less",
         ],
     ),
@@ -301,7 +308,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
 
 /// Tables that are off by default, at the end of the file.
 pub(crate) const OFF_TABLES: &str = "
-# How the table top is searched for; left out, it is what the central beam hits first.
+# Search for the table top; without it, the table is the surface that the central beam hits first.
 #[room.table]
 #threshold_mm = 10.0    # from the plane up to which a point belongs to it
 #iterations = 1000
@@ -309,11 +316,11 @@ pub(crate) const OFF_TABLES: &str = "
 #max_tilt_deg = 20.0
 #cell_mm = 60.0    # of the lattice that separates patches
 #min_area_mm2 = 60000.0
-#region = [[-500, -500, -100], [500, 1500, 100]]    # low and high corner of where it is looked for
+#region = [[-500, -500, -100], [500, 1500, 100]]    # low and high corner of the box to search
 #beam = [[0, 0, 1040], [0, 0, -1]]    # source and direction of the central beam
 #min_beam_mm = 300.0    # from the source
 
-# Errors of the cameras' sensors; left out, depth images are ideal. These are the limits of the
+# Errors of the cameras' sensors; without them, depth images are ideal. These are the limits of the
 # Azure Kinect; `ppa depth fit-noise` finds those of a device.
 #[depth.sensor]
 #random = { floor_mm = 0, at_unit_signal_mm = 1.14 }

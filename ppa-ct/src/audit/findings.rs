@@ -14,7 +14,7 @@ use crate::scan::{Warning, WarningCode};
 pub struct Finding {
     /// Stable code for scripts.
     pub code: FindingCode,
-    /// How much it matters.
+    /// Severity of the finding.
     pub severity: Severity,
     /// What was found, in one sentence.
     pub text: String,

@@ -71,7 +71,7 @@ pub(crate) fn name_of(source: Option<LabelSource>) -> &'static str {
 pub struct LabelRow {
     /// Quality from 1 (ideal) to 3 (inadequate): the mean over the readers.
     pub label: f64,
-    /// Its spread. Readers: standard deviation dividing by their number (ddof 0), as published.
+    /// Spread of the label. Readers: standard deviation dividing by their number (ddof 0), as published.
     pub std: f64,
     /// Half degrees of medial rotation.
     pub step: u32,

@@ -43,10 +43,10 @@ pub struct Plan {
     /// Body shapes.
     #[serde(default)]
     pub shapes: ShapeSettings,
-    /// How deeply heel and calf are indented where they rest on the table; a rigid skin when left out.
+    /// Indentation of heel and calf where they rest on the table; without it, the skin is rigid.
     #[serde(default)]
     pub soft_tissue: SoftTissue,
-    /// Errors of positioning: how far the limb is tilted, and how far its joint lies from the central beam.
+    /// Positioning errors: tilt of the limb, and offset of its joint from the central beam.
     #[serde(default)]
     pub positioning: Positioning,
     /// The x-ray room.

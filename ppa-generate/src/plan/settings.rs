@@ -43,7 +43,7 @@ pub struct DepthSettings {
     pub roi_mm: f64,
     /// Errors of the cameras' sensors; ideal images when absent.
     pub sensor: Option<SensorSpec>,
-    /// What a camera sees where the field of view of the scan cuts the limb off: nothing (`invalid`), or a flat wall (`flat`).
+    /// Depth where the field of view of the scan cuts the limb off: none (`invalid`), or that of a flat wall (`flat`).
     pub cut_faces: WallDepth,
     /// Largest share of a region of interest, 0 to 1, that may show a cut of the limb, measured on the skin of the scan; a limb that
     /// exceeds it in any pose is refused.
@@ -87,7 +87,7 @@ pub struct XraySettings {
     pub anode_angle_deg: f64,
     /// Filters as `MATERIAL:mm`.
     pub filters: Vec<String>,
-    /// Focal spot, heel effect and collimation; when left out, a point source collimated to the detector.
+    /// Focal spot, heel effect and collimation; without it, a point source collimated to the detector.
     pub source: Source,
     /// Pixels of the image.
     pub detector: Detector,

@@ -17,7 +17,7 @@ pub struct FoundJoint {
     pub joint: Joint,
     /// Position, mm: the point of the tibia's shaft in the gap of an ankle, the middle of the plateau in that of a knee.
     pub centre_mm: [f64; 3],
-    /// How clear the joint space is: how much less dense than the thinner bone plate next to it, HU.
+    /// Depth of the joint space: difference to the less dense of the adjacent bone plates, HU.
     pub gap_depth_hu: f64,
     /// Further findings for a knee.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -14,9 +14,9 @@ use crate::setters::setters;
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Source {
-    /// The area that photons leave from.
+    /// Area from which photons are emitted.
     pub focal_spot: FocalSpot,
-    /// Which part of the detector plane photons are sent to.
+    /// Part of the detector plane that the beam covers.
     pub collimation: Collimation,
     /// Distance of the collimator blades from the focal spot along device z, mm: an extended spot gives the field a penumbra. Without it,
     /// edges are sharp.
@@ -36,7 +36,7 @@ pub struct Source {
 pub struct FocalSpot {
     /// Side of the square, or full width at half maximum of the Gaussian, mm; 0 is a point.
     pub size_mm: f64,
-    /// How the intensity is spread.
+    /// Distribution of the intensity.
     pub shape: SpotShape,
 }
 

@@ -34,9 +34,9 @@ use crate::transport::tracking::TransportError;
 pub struct AnalogSettings {
     /// Photons emitted into the field.
     pub histories: u64,
-    /// Seed of the image: history n of a seed is the same whatever runs in parallel.
+    /// Seed of the image: history n of a seed is the same for any number of threads.
     pub seed: u64,
-    /// How photons scatter off electrons.
+    /// Model of Compton scattering.
     pub compton_model: ComptonModel,
 }
 

@@ -22,7 +22,7 @@ pub struct FastSettings {
     pub scatter_pixel_mm: f64,
     /// Largest number of primary rays per pixel side, where the image has edges.
     pub samples_per_side: u32,
-    /// How photons scatter off electrons.
+    /// Model of Compton scattering.
     pub compton_model: ComptonModel,
     /// Seed of the image.
     pub seed: u64,
