@@ -110,14 +110,14 @@ impl fmt::Display for FindingCode {
 pub struct Finding {
     /// Stable code for scripts and for `acknowledged` in a case.
     pub code: FindingCode,
-    /// Its severity.
+    /// Severity of the finding.
     pub severity: Severity,
     /// What was found and expected, in one sentence with units.
     pub text: String,
     /// The number that was compared with a limit; `text` gives its unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Its place: a point in the ct frame (LPS), mm.
+    /// Place of the finding: a point in the ct frame (LPS), mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub place_mm: Option<[f64; 3]>,
 }

@@ -34,7 +34,7 @@ pub struct FileRow {
     pub file: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
-    /// Its kind.
+    /// Kind of file.
     pub kind: FileKind,
     /// Person and side.
     #[serde(flatten)]

@@ -29,7 +29,7 @@ pub struct Body {
     /// Middle of the core in the `ct` frame, mm.
     pub centre_mm: [f64; 3],
     /// A point in the core, `ct` frame, mm: its middle or, if that is outside (as in a splint), the centre of the nearest voxel of the
-    /// core. `None` in cases from earlier versions.
+    /// core. Absent in cases from earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside_mm: Option<[f64; 3]>,
 }

@@ -28,7 +28,7 @@ pub struct Ball {
 pub struct LimbSettings {
     /// HU of the skin surface, half-way between air and soft tissue.
     pub iso_hu: f64,
-    /// Part of the volume to search; `None` for all of it.
+    /// Part of the volume to search; all of it by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop: Option<VoxelBox>,
     /// A point in the wanted limb, `ct` frame, mm, to replace the automatic choice.
