@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs all fuzz targets, or those named, for some seconds each (default 5): fuzz/run.sh 60, fuzz/run.sh 60 nifti ply.
+# Runs all fuzz targets, or those named, for some seconds each (default 5): fuzz/run.sh 60, fuzz/run.sh 60 nifti mesh.
 #
 # Builds and runs them like `cargo fuzz run -s none TARGET`, but with the stable compiler and without cargo-fuzz. Crashing inputs
 # are written to fuzz/artifacts. Needs a C++ compiler for libFuzzer.

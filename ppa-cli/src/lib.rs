@@ -118,7 +118,7 @@ enum Command {
     Calibrate(commands::calibrate::CalibrateArgs),
     /// Predict pose quality from pairs of depth images as they arrive
     Predict(commands::predict::PredictArgs),
-    /// Run the paper's experiments: training runs and tables from one plan
+    /// Run the paper's experiments and write their tables
     #[command(subcommand)]
     Experiment(commands::experiment::ExperimentCommand),
     /// Metrics of predictions against labels

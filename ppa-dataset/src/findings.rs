@@ -1,7 +1,7 @@
 //! Findings: doubts about a limb or a pose, passed on with the data from the case to training.
 //!
 //! `ppa prepare` writes them into the case; a dataset lists those of all its limbs in `findings.json`. A person who has
-//! checked a severe one adds its code to `acknowledged` of the case; until then every command repeats it.
+//! checked a severe one adds its code to `acknowledged` of the case; until then, commands that use the limb repeat it.
 
 use std::fmt;
 use std::fs;

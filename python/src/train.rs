@@ -61,7 +61,7 @@ fn sources(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
 /// evaluation : path, dict or list of them, optional
 ///     Datasets to measure errors on, with other persons.
 /// preset : {"quick", "standard", "paper"}
-///     Default settings: training takes minutes, a quarter of an hour, or days on two cores.
+///     Default settings: on two cores, training takes minutes with the first two, and days with the last.
 /// seed : int, optional
 ///     Replaces the preset's seed.
 /// progress : bool or callable, optional

@@ -263,7 +263,7 @@ fn describe_found(found: &Found) -> Vec<String> {
     severe.dedup();
     if !severe.is_empty() {
         lines.push(format!(
-            "Every command repeats severe findings; once you have reviewed them, add to the case: acknowledged = [{}]",
+            "Later commands repeat severe findings; once you have reviewed them, add to the case: acknowledged = [{}]",
             severe.join(", ")
         ));
     }

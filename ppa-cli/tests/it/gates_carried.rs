@@ -55,6 +55,7 @@ fn a_severe_finding_is_repeated_until_it_is_acknowledged() {
         "plan plan.toml",
         "generate plan.toml --out data",
         "verify data --plan plan.toml",
+        "label export data --out for_readers",
     ] {
         let (_, said) = both(folder, command);
         assert_eq!(said.matches(OPEN).count(), 1, "{command}: {said}");
@@ -62,8 +63,16 @@ fn a_severe_finding_is_repeated_until_it_is_acknowledged() {
     }
     let status = succeed(folder, "status data");
     contains(&status, &["of which severe and not acknowledged: 1"]);
-    let (_, said) = both(folder, "scene place leg.toml");
-    contains(&said, &["severe [side-mismatch] limb l of leg.toml"]);
+    for command in [
+        "scene place leg.toml",
+        "depth render leg.toml --out depth.png",
+    ] {
+        let (_, said) = both(folder, command);
+        contains(&said, &["severe [side-mismatch] limb l of leg.toml"]);
+    }
+    // It has no bones to label by.
+    let said = fail(folder, "label auto data --plan plan.toml");
+    contains(&said, &[OPEN, "does not specify bones"]);
 
     acknowledge(folder, "\"side-mismatch\"");
     let (made, said) = both(folder, "generate plan.toml --out data --json");

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::{LimbId, View};
-use ppa_generate::{Case, DepthView, PreparedLimb, SceneSetup, VisibleLimb};
+use ppa_generate::{Case, DepthView, SceneSetup, VisibleLimb};
 use serde::Serialize;
 
 use super::render::{RenderArgs, name, of_view, read_sensor, write_others};
+use crate::findings::prepared;
 use crate::output::{Output, working};
 
 /// Declares the output files for the images of a case.
@@ -60,10 +61,8 @@ pub fn run(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()>
     let case = Case::read(path)?;
     let working = working("preparing the limb");
     let setup = SceneSetup::of_plan(&plan)?;
-    let limb = PreparedLimb::of_case(&case)
-        .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
+    let limb = VisibleLimb::new(prepared(&case, path)?)?;
     let angle_deg = args.of_case.angle.unwrap_or_default();
-    let limb = VisibleLimb::new(limb)?;
     let limb = match args.of_case.shape {
         None | Some(BodyShape::Orig) => limb,
         Some(shape) => {

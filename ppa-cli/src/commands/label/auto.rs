@@ -12,6 +12,7 @@ use ppa_generate::{Case, Plan};
 use ppa_label::{CaseBones, ComputedLabels, LabelScale, LabelledLimb, ScaleName, compute_labels};
 use serde::Serialize;
 
+use crate::findings::repeat_of_datasets;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
 use crate::output_files::{ReplaceArgs, require_writable};
@@ -81,6 +82,7 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
     let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
     require_writable("the dataset", &args.dataset)?;
     let stoppable = ends_at_once(NOTHING_WRITTEN)?;
+    repeat_of_datasets(std::iter::once(&*args.dataset))?;
     let working = working("following rays through the joint");
     let limbs = plan.cases.iter().map(|planned| {
         let case = Case::read(&planned.file)?;

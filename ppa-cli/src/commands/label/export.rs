@@ -9,6 +9,7 @@ use ppa_dataset::{Manifest, write_whole};
 use ppa_label::{PICTURES_PER_PAGE, PageNumber, ReaderCase, grading_page, write_key};
 use serde::Serialize;
 
+use crate::findings::repeat_of_datasets;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, bytes, working};
 use crate::output_files::OutputFiles;
@@ -60,6 +61,7 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
         key.display(),
         args.out.display()
     );
+    repeat_of_datasets(std::iter::once(&*args.dataset))?;
     let working = working("collecting radiographs");
     let manifest = Manifest::read(&args.dataset)?;
     let shown = ReaderCase::of_dataset(&manifest, args.seed, args.every_deg);
