@@ -1,8 +1,7 @@
 //! Symbols and densities of the elements H to U.
 
-/// Symbol and density in g/cm³ at room conditions by atomic number less one, as in xraylib 4.3.0.
-///
-/// At and Fr have no measured density; their numbers are placeholders.
+/// Symbol and density in g/cm³ at room conditions by atomic number less one, as in xraylib 4.3.0; 0 for At and Fr, whose densities have
+/// not been measured.
 const ELEMENTS: [(&str, f64); 92] = [
     ("H", 8.4e-05),
     ("He", 0.000166),
@@ -88,9 +87,9 @@ const ELEMENTS: [(&str, f64); 92] = [
     ("Pb", 11.35),
     ("Bi", 9.747),
     ("Po", 9.32),
-    ("At", 9.32),
+    ("At", 0.0),
     ("Rn", 0.009066),
-    ("Fr", 1.0),
+    ("Fr", 0.0),
     ("Ra", 5.0),
     ("Ac", 10.07),
     ("Th", 11.72),
@@ -111,7 +110,8 @@ pub(crate) fn atomic_number(text: &str) -> Option<u8> {
     u8::try_from(index + 1).ok()
 }
 
-/// Density of a pure element in g/cm³.
+/// Density of a pure element in g/cm³; `None` if it has not been measured.
 pub(crate) fn density_g_cm3(z: u8) -> Option<f64> {
-    Some(ELEMENTS.get(usize::from(z).checked_sub(1)?)?.1)
+    let density = ELEMENTS.get(usize::from(z).checked_sub(1)?)?.1;
+    (density > 0.0).then_some(density)
 }

@@ -300,6 +300,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn elements_without_a_measured_density_need_one() {
+        for (symbol, z) in [("At", 85), ("Fr", 87)] {
+            assert!(find(symbol).is_none(), "{symbol}");
+            assert!(Material::from_composition(symbol, 5.0, &[(z, 1.0)]).is_ok());
+        }
+    }
+
     /// The compositions of a tissue in two reports differ by a few percent where it matters.
     #[test]
     fn tissues_of_different_reports_are_alike() {

@@ -188,7 +188,7 @@ impl Material {
     /// Returns a material of the library, such as `water`, `bone_cortical` or `titanium`, or a pure element by symbol, such as `Al`.
     ///
     /// # Errors
-    /// A name that is neither listed by [`Material::names`] nor a symbol.
+    /// A name that is neither listed by [`Material::names`] nor the symbol of an element with a measured density, H to U except At and Fr.
     pub fn named(name: &str) -> Result<Self, MaterialError> {
         library::find(name).ok_or_else(|| MaterialError::Unknown {
             name: name.to_owned(),
