@@ -8,7 +8,7 @@ pub const DEFAULT_MAX_ARRAY_SIZE: u64 = 1001;
 /// Reads MaxArraySize from the output of `scontrol show config`; indices of an array are below it.
 ///
 /// # Errors
-/// [`SlurmError::NoArraySize`] if there is no number, [`SlurmError::NoArrays`] if the cluster accepts no arrays.
+/// [`SlurmError::NoArraySize`] if the number is missing, [`SlurmError::NoArrays`] if the cluster does not support job arrays.
 pub fn max_array_size(config: &str) -> Result<u64, SlurmError> {
     let value = config.lines().find_map(|line| {
         let (key, value) = line.split_once('=')?;

@@ -291,7 +291,7 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Returns the record that tells whether a finished training run still matches the plan.
+    /// Returns the settings and data of a training run, which are compared with those of a finished run.
     ///
     /// Refuses to test persons whose images were used in pretraining.
     fn record(&self, training: Training, config: &TrainConfig) -> Result<Record, TrainError> {

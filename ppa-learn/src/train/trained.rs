@@ -49,7 +49,7 @@ pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainErro
     Ok((config, network))
 }
 
-/// Returns the number of optimiser steps in the checkpoint of a training run; 0 if there is no checkpoint.
+/// Returns the optimiser step at which the checkpoint of a training run was saved; 0 without a checkpoint.
 ///
 /// # Errors
 /// [`TrainError`] naming a checkpoint that cannot be read.

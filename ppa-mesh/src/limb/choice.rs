@@ -79,7 +79,7 @@ pub fn kept(
     Ok(kept)
 }
 
-/// Keeps the body around a point, or removes it if it is kept; `is_near` tells whether a voxel is near enough to its body to be part of it.
+/// Adds the body around a point to `kept`, or removes it from there. `is_near` returns whether a voxel is close enough to its body to belong to it.
 pub fn toggle(
     grid: &Grid,
     tissue: &Tissue,

@@ -3,8 +3,8 @@
 /// A pixel (u, v).
 pub(crate) type Pixel = (usize, usize);
 
-/// Pixels (u, v) connected with `start`; `take` tells whether a pixel belongs and must return true
-/// only once per pixel.
+/// Returns the pixels (u, v) connected to `start`. `take` returns whether a pixel is part of the set, and true at most once per
+/// pixel.
 pub(crate) fn flood(
     start: usize,
     (nu, nv): (usize, usize),
