@@ -106,7 +106,7 @@ pub enum SlurmError {
         /// Value found, or a note that the line is missing.
         found: String,
     },
-    /// The cluster accepts no job arrays.
+    /// The cluster does not support job arrays.
     #[error("the cluster accepts no job arrays: its MaxArraySize is {found}, expected 2 or more")]
     NoArrays {
         /// MaxArraySize.

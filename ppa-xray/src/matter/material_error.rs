@@ -55,7 +55,7 @@ pub enum MaterialError {
         found: f64,
     },
     /// The name is not in the library.
-    #[error("no material is named {name:?}; known materials are {} and the symbols of the elements H to U", known.join(", "))]
+    #[error("no material is named {name:?}; known materials are {} and the symbols of the elements H to U except At and Fr, whose densities are not known", known.join(", "))]
     Unknown {
         /// Name given.
         name: String,
