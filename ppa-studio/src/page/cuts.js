@@ -34,14 +34,14 @@ function circle(context, view, l, { voxel, radius_mm }) {
 }
 
 export class CutPanel {
-  // `actions.remove` takes the balls to cut off, `actions.redraw` redraws the slices, `actions.crosshair` returns a place in the scan, mm.
+  // `actions.remove` takes a function that changes the list of balls, `actions.redraw` redraws the slices, `actions.crosshair` returns a place in the scan, mm.
   constructor(store, actions) {
     Object.assign(this, { store, actions, shown: 0 });
     byId("cut-radius").addEventListener("input", () => this.changed());
     byId("cut").addEventListener("toggle", () => this.changed());
     byId("cut-here").addEventListener("click", () => {
       const ball = { centre_mm: actions.crosshair(), radius_mm: Number(byId("cut-radius").value) };
-      actions.remove([...store.doc.removed, ball]);
+      actions.remove((balls) => [...balls, ball]);
     });
   }
 
@@ -54,11 +54,11 @@ export class CutPanel {
 
   show() {
     const balls = this.store.doc.removed;
-    byId("cuts").replaceChildren(...balls.map((ball, number) => {
+    byId("cuts").replaceChildren(...balls.map((ball) => {
       const where = `the ball around ${point(ball.centre_mm, 0)} mm`;
       const item = element("li", `ball of ${fixed(ball.radius_mm, 0)} mm around ${point(ball.centre_mm, 0)} mm `);
       item.append(button("Show", () => this.actions.place(ball.centre_mm), `Show ${where}`));
-      item.append(button("Put back", () => this.actions.remove(balls.filter((_, other) => other !== number)), `Put back ${where}`));
+      item.append(button("Put back", () => this.actions.remove((all) => all.filter((other) => JSON.stringify(other) !== JSON.stringify(ball))), `Put back ${where}`));
       return item;
     }));
     if (balls.length > this.shown) byId("cut").open = true;

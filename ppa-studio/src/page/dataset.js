@@ -1,6 +1,6 @@
 // The dataset: quality of its poses, with filters, outliers, images of a pose, findings and splits.
 
-import { Refused, getBytes, getJson, postJson } from "/page/server.js";
+import { Refused, getBytes, getJson, newest, postJson } from "/page/server.js";
 import { button, commandRows, element, table } from "/page/elements.js";
 import { MOST_SERIES, ROTATION, chart, mark, styleOf } from "/page/charts.js";
 import { fixed } from "/page/geometry.js";
@@ -25,6 +25,8 @@ export class DatasetPanel {
   constructor(actions) {
     this.actions = actions;
     this.found = null;
+    // Shows the images of a pose.
+    this.show = newest((pose) => this.put(pose));
     for (const id of ["filter-limb", "filter-shape", "filter-from", "filter-to"]) byId(id).addEventListener("change", () => this.draw());
     byId("dataset-refresh").addEventListener("click", () => this.load());
     byId("dataset-check").addEventListener("click", () => this.check());
@@ -146,7 +148,7 @@ export class DatasetPanel {
     this.show(others.reduce((best, pose) => (Math.abs(pose.angle_deg - wanted) < Math.abs(best.angle_deg - wanted) ? pose : best), first));
   }
 
-  async show(pose) {
+  async put(pose) {
     const query = `?folder=${encodeURIComponent(this.actions.folder())}`;
     byId("pose").hidden = false;
     byId("pose-name").textContent = poseName(pose);

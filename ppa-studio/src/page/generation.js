@@ -1,6 +1,6 @@
 // Forecast, generation, contact sheet and shards of the plan's dataset.
 
-import { Refused, getBytes, getJson, post, postJson } from "/page/server.js";
+import { Refused, getBytes, getJson, inTurn, post, postJson } from "/page/server.js";
 import { commandRows, facts, table } from "/page/elements.js";
 import { fixed } from "/page/geometry.js";
 
@@ -27,6 +27,7 @@ export class GenerationPanel {
     this.actions = actions;
     this.state = null;
     this.sheetOf = null;
+    this.ask = inTurn(async (request) => this.put(await request()));
     byId("forecast").addEventListener("click", () => this.forecast());
     byId("generate").addEventListener("click", () => this.start());
     byId("pause").addEventListener("click", () => this.pause());
@@ -40,7 +41,7 @@ export class GenerationPanel {
     if (!folder) return;
     const query = `?folder=${encodeURIComponent(folder)}`;
     try {
-      this.put(await getJson(`generation${query}`));
+      await this.ask(() => getJson(`generation${query}`));
       this.shards(await getJson(`generation/shards${query}`));
     } catch (error) {
       this.refused(error);
@@ -54,7 +55,7 @@ export class GenerationPanel {
 
   async start() {
     try {
-      this.put(await postJson("generation", { folder: this.actions.folder() }));
+      await this.ask(() => postJson("generation", { folder: this.actions.folder() }));
       this.actions.tell("");
       this.actions.started();
     } catch (error) {
@@ -64,7 +65,7 @@ export class GenerationPanel {
 
   async pause() {
     try {
-      this.put(await postJson("generation/pause", { folder: this.actions.folder() }));
+      await this.ask(() => postJson("generation/pause", { folder: this.actions.folder() }));
     } catch (error) {
       this.refused(error);
     }
@@ -72,7 +73,7 @@ export class GenerationPanel {
 
   async poll() {
     try {
-      this.put(await getJson(`generation?folder=${encodeURIComponent(this.actions.folder())}`));
+      await this.ask(() => getJson(`generation?folder=${encodeURIComponent(this.actions.folder())}`));
     } catch (error) {
       this.refused(error);
     }

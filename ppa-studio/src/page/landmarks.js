@@ -44,9 +44,8 @@ export class LandmarkPanel {
       input.id = `${key}-${word}`;
       input.setAttribute("aria-label", `${label}, ${word}, mm`);
       input.addEventListener("change", () => {
-        const range = [...this.store.doc.landmarks[key].range_mm];
-        range[end] = Number(input.value);
-        this.actions.choose({ [key]: range });
+        const mm = Number(input.value);
+        this.actions.choose((landmarks) => ({ [key]: landmarks[key].range_mm.with(end, mm) }));
       });
       row.append(input);
     }
@@ -68,11 +67,7 @@ export class LandmarkPanel {
   }
 
   place(corner, place) {
-    this.actions.choose({ plane_points: this.withCorner(corner, place) });
-  }
-
-  withCorner(corner, place) {
-    return this.store.doc.landmarks.plane_points.map((p, i) => (i === corner ? place : p));
+    this.actions.choose(({ plane_points }) => ({ plane_points: plane_points.with(corner, place) }));
   }
 
   // Returns the handles of the 3D view: points of the plane move along the skin, the joint across the line of sight.
@@ -89,7 +84,7 @@ export class LandmarkPanel {
     });
     return [
       handle(landmarks.joint_centre, false, (place) => ({ joint_centre: place })),
-      ...landmarks.plane_points.map((at, corner) => handle(at, true, (place) => ({ plane_points: this.withCorner(corner, place) }))),
+      ...landmarks.plane_points.map((at, corner) => handle(at, true, (place) => ({ plane_points: landmarks.plane_points.with(corner, place) }))),
     ];
   }
 

@@ -1,6 +1,6 @@
 // The page: one store, one place that changes it, and views that follow.
 
-import { getJson, newest, onAnswer, postJson } from "/page/server.js";
+import { getJson, inTurn, newest, onAnswer, postJson } from "/page/server.js";
 import { fixed, inverse, point, transform, IDENTITY } from "/page/geometry.js";
 import { SliceView } from "/page/slices.js";
 import { surfaceAt } from "/page/surface.js";
@@ -29,13 +29,15 @@ const WINDOWS = [["Soft tissue", 40, 400], ["Bone", 400, 1800], ["Skin", -300, 1
 
 const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true, cropping: false, ball: null };
 
-const actions = { change, choose, crosshair, landmarks: drawLandmarks, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands, prediction: showPrediction };
+// Makes changes in the order of the user's actions.
+const change = inTurn(send);
+const actions = { change, choose, crosshair, landmarks: drawLandmarks, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: newest(showImageCommands), prediction: showPrediction };
 
 const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) => new SliceView(figure, store, actions));
 const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
 const crop = new CropPanel(store, actions);
-const cuts = new CutPanel(store, { crosshair, place: setPlace, redraw: actions.redraw, remove: (removed) => change("surface", { removed }) });
+const cuts = new CutPanel(store, { crosshair, place: setPlace, redraw: actions.redraw, remove: (removed) => change("surface", (doc) => ({ removed: removed(doc.removed) })) });
 const shapes = new ShapePanel(store, { surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
 const bodies = new Bodies(store, view3d, { change, fail });
 const whatIf = new WhatIfPanel(store, actions);
@@ -73,12 +75,12 @@ function fail(error) {
   byId("message").textContent = error.message;
 }
 
-// Sends a change to the program and shows the result.
-async function change(path, body) {
+// Sends a change to the program and shows the result. `body` may be a function of the current state.
+async function send(path, body) {
   document.body.setAttribute("aria-busy", "true");
   const slow = setTimeout(() => tell("computing …"), 300);
   try {
-    await show(await postJson(path, body));
+    await show(await postJson(path, typeof body === "function" ? body(store.doc) : body));
     tell("");
   } catch (error) {
     fail(error);
@@ -93,11 +95,15 @@ async function change(path, body) {
 }
 
 // Sets landmarks chosen by the user; null lets one be found again. Regions and points of the axis exclude each other.
-function choose(changes) {
-  const choices = { ...store.doc.choices, ...changes };
-  if (["joint_region", "calf_region", "axis_source"].some((key) => changes[key])) delete choices.axis;
-  const given = Object.entries(choices).filter(([, value]) => value !== null && value !== undefined);
-  return change("choices", Object.fromEntries(given));
+// `chosen` may be a function of the current landmarks.
+function choose(chosen) {
+  return change("choices", ({ choices: before, landmarks: shown }) => {
+    const changes = typeof chosen === "function" ? chosen(shown) : chosen;
+    const choices = { ...before, ...changes };
+    if (["joint_region", "calf_region", "axis_source"].some((key) => changes[key])) delete choices.axis;
+    const given = Object.entries(choices).filter(([, value]) => value !== null && value !== undefined);
+    return Object.fromEntries(given);
+  });
 }
 
 async function show(doc) {
@@ -180,7 +186,12 @@ function showPrediction(command) {
 }
 
 async function showImageCommands(values) {
-  const commands = await postJson("commands", values);
+  let commands;
+  try {
+    commands = await postJson("commands", values);
+  } catch (error) {
+    return fail(error);
+  }
   if (store.step !== "whatif" && store.step !== "room") return;
   const rows = commandRows([commands.depth, ...(store.step === "room" ? [commands.coverage] : [commands.radiograph, commands.dose])]);
   if (commands.need_saved_plan) {

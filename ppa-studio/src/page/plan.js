@@ -1,6 +1,6 @@
 // The form of the plan: a field for each key declared by the types of the plan.
 
-import { Refused, getJson, newest, postJson } from "/page/server.js";
+import { Refused, getJson, inTurn, newest, postJson } from "/page/server.js";
 import { button, element, table } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
@@ -108,6 +108,7 @@ export class PlanPanel {
     this.actions = actions;
     this.plan = null;
     this.updates = [];
+    this.ask = inTurn(async (request) => this.show(await request()));
     this.materials = element("div", "", { id: "plan-materials" });
     this.limits = newest((of) => this.showLimits(of));
     byId("plan-save").addEventListener("click", () => this.save());
@@ -118,7 +119,7 @@ export class PlanPanel {
 
   async load() {
     try {
-      this.show(await getJson("plan/form"));
+      await this.ask(() => getJson("plan/form"));
     } catch (error) {
       this.actions.fail(error);
     }
@@ -132,7 +133,7 @@ export class PlanPanel {
     // Limbs are identified by their indices, which may change.
     byId("plan-limbs").inert = true;
     try {
-      this.show(await postJson(path, body));
+      await this.ask(() => postJson(path, body));
       this.actions.tell("");
       this.actions.changed();
     } catch (error) {
@@ -222,7 +223,7 @@ export class PlanPanel {
     const set = async (value) => {
       error.textContent = "";
       try {
-        this.show(await postJson("plan/key", { key: field.key, value }));
+        await this.ask(() => postJson("plan/key", { key: field.key, value }));
         this.actions.tell("");
         this.actions.changed();
       } catch (refusal) {

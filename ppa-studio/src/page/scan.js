@@ -16,7 +16,7 @@ export function showScan(doc, actions) {
     if (finding.place_mm) item.append(button("Show", () => actions.place(finding.place_mm), `Show ${finding.code}`));
     if (finding.severity === "severe") {
       const known = doc.acknowledged.includes(finding.code);
-      const codes = known ? doc.acknowledged.filter((code) => code !== finding.code) : [...doc.acknowledged, finding.code];
+      const codes = ({ acknowledged }) => (known ? acknowledged.filter((code) => code !== finding.code) : [...acknowledged, finding.code]);
       item.append(button(known ? "Acknowledged" : "Acknowledge", () => actions.change("acknowledged", codes), `Acknowledge ${finding.code}`));
     }
     return item;

@@ -98,6 +98,16 @@ export async function getPicture(path, signal) {
   return { picture: await response.blob(), report: JSON.parse(response.headers.get("x-report")) };
 }
 
+// Makes calls one after another, so that their answers arrive in the order of the calls.
+export function inTurn(call) {
+  let previous = Promise.resolve();
+  return (...values) => {
+    const next = () => call(...values);
+    previous = previous.then(next, next);
+    return previous;
+  };
+}
+
 // Calls `make` for the newest value only: during a call, later values replace each other.
 export function newest(make) {
   let waiting = null;
@@ -106,11 +116,14 @@ export function newest(make) {
     waiting = { value };
     if (busy) return;
     busy = true;
-    while (waiting) {
-      const { value } = waiting;
-      waiting = null;
-      await make(value);
+    try {
+      while (waiting) {
+        const { value } = waiting;
+        waiting = null;
+        await make(value);
+      }
+    } finally {
+      busy = false;
     }
-    busy = false;
   };
 }

@@ -200,6 +200,22 @@ impl Page {
             .unwrap();
     }
 
+    /// Delays the answer to the next request below a path by a second; then sets `window.late`.
+    pub async fn delay_next(&self, path: &str) {
+        let script = "const [path] = arguments; const immediate = window.fetch; window.late = false; \
+                      window.fetch = async (asked, options) => { \
+                        if (!asked.startsWith(path)) return immediate(asked, options); \
+                        window.fetch = immediate; \
+                        const answer = await immediate(asked, options); \
+                        await new Promise((done) => { setTimeout(done, 1000); }); \
+                        setTimeout(() => { window.late = true; }, 200); \
+                        return answer; };";
+        self.client
+            .execute(script, vec![json!(path)])
+            .await
+            .unwrap();
+    }
+
     /// Saves a screenshot in the folder `PPA_PAGE_PICTURES`, if set.
     pub async fn picture(&self, name: &str) {
         if let Some(folder) = std::env::var_os("PPA_PAGE_PICTURES") {

@@ -140,6 +140,14 @@ fn a_dragged_landmark_is_saved_and_undone() {
         )
         .await;
         assert!(Case::read(&edited).unwrap().choices.joint_region.is_some());
+        // Two changes at once are both made.
+        let at_once = "for (const id of ['calf_region-from', 'calf_region-to']) { const field = document.getElementById(id); \
+                       field.value = Number(field.value) + 1; field.dispatchEvent(new Event('change')); }";
+        let ends = "['from', 'to'].map((end) => Number(document.getElementById(`calf_region-${end}`).value) + 1)";
+        let ends: [f64; 2] = serde_json::from_value(page.value(ends).await).unwrap();
+        page.client.execute(at_once, vec![]).await.unwrap();
+        page.until(|| Case::read(&edited).unwrap().choices.calf_region == Some(ends))
+            .await;
         page.click("[aria-label='Find again: Axis']").await;
         page.wait(
             "document.querySelectorAll('#landmark-table tbody tr')[1].textContent.includes('chosen') === false",
@@ -216,6 +224,11 @@ fn images_follow_the_sliders_and_the_newest_wins() {
             page.slide("slider-angle_deg", f64::from(step) * 0.5).await;
         }
         page.slide("slider-angle_deg", 18.0).await;
+        // A late answer does not replace that to a later request.
+        page.delay_next("/api/commands").await;
+        page.slide("slider-angle_deg", 7.0).await;
+        page.slide("slider-angle_deg", 18.0).await;
+        page.wait("window.late").await;
         page.wait("document.querySelector('#command-list').textContent.includes('--angle 18 ')")
             .await;
         // The dose is offered when the radiograph of the newest exposure is complete.

@@ -44,6 +44,12 @@ fn an_outlier_is_shown_and_opened_in_its_pose() {
         page.wait("document.getElementById('pose').dataset.step === '30'")
             .await;
         page.picture("dataset_outlier").await;
+        let grey = "(() => { const image = document.getElementById('pose-depth'); const { naturalWidth: w, naturalHeight: h } = image; \
+                    const drawing = new OffscreenCanvas(w, h).getContext('2d'); drawing.drawImage(image, 0, 0); \
+                    return drawing.getImageData(0, 0, w, h).data.reduce((sum, value) => sum + value, 0); })()";
+        let complete = "document.getElementById('pose-depth').complete";
+        page.wait(complete).await;
+        let outlier = page.value(grey).await;
         page.click("#dataset-check").await;
         page.wait(
             "document.getElementById('check-text').textContent.startsWith('22 depth images')",
@@ -61,10 +67,18 @@ fn an_outlier_is_shown_and_opened_in_its_pose() {
         page.click(".chart .pose").await;
         page.wait("document.getElementById('pose').dataset.step === '0'")
             .await;
+        page.wait(complete).await;
+        assert_ne!(page.value(grey).await, outlier);
+        // A late image does not replace that of a later pose.
+        page.delay_next("/api/dataset/depth").await;
+        page.click(".chart .pose").await;
         page.fill("#pose-angle", "15.4").await;
         page.click("#pose-form button").await;
+        page.wait("window.late").await;
         page.wait("document.getElementById('pose').dataset.step === '30'")
             .await;
+        page.wait(complete).await;
+        assert_eq!(page.value(grey).await, outlier);
         page.click("#pose-open button").await;
         page.wait("document.body.dataset.step === 'whatif'").await;
         page.wait("document.getElementById('slider-angle_deg').value === '15'")
