@@ -71,13 +71,20 @@ fn search(
         source,
     };
     let (mut files, mut dicom, mut subfolders) = (0, BTreeSet::new(), Vec::new());
+    let mut damaged = 0;
     for entry in std::fs::read_dir(folder).map_err(|e| io(folder, e))? {
         let entry = entry.map_err(|e| io(folder, e))?;
         let path = entry.path();
         if path.is_file() {
             files += 1;
-            if !seen.contains(&path) && starts_as_dicom(&path).map_err(|e| io(&path, e))? {
+            if seen.contains(&path) {
+                continue;
+            }
+            if starts_as_dicom(&path).map_err(|e| io(&path, e))? {
                 dicom.insert(path);
+            } else if is_named_as_dicom(&path) {
+                damaged += 1;
+                seen.insert(path);
             }
         } else if entry.file_type().map_err(|e| io(&path, e))?.is_dir() {
             subfolders.push(path);
@@ -88,6 +95,7 @@ fn search(
     let mut found = scan_headers(dicom, options)?;
     let no_image = |f: &Found| matches!(f, Found::NotAnImage | Found::Directory(_));
     let go_on = found.iter().all(no_image);
+    found.extend((0..damaged).map(|_| Found::Damaged));
     found.extend(listed(&found, seen, options)?);
     if go_on {
         for subfolder in subfolders {
@@ -97,6 +105,17 @@ fn search(
         }
     }
     Ok((found, files))
+}
+
+/// Whether a file is named like a slice. Hidden files such as `._slice.dcm` are not: macOS writes them.
+fn is_named_as_dicom(path: &Path) -> bool {
+    let hidden = path
+        .file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    let named = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("dcm"));
+    named && !hidden
 }
 
 /// Classifies the files listed by the directories found, except those already in `seen`.
@@ -109,17 +128,24 @@ fn listed(
         Found::Directory(listed) => Some(listed),
         _ => None,
     });
-    let mut files = BTreeSet::new();
+    let (mut files, mut damaged) = (BTreeSet::new(), 0);
     for file in directories.flat_map(|directory| &directory.files) {
         let dicom = starts_as_dicom(file).map_err(|source| ReadError::Io {
             path: file.clone(),
             source,
         })?;
-        if dicom && seen.insert(file.clone()) {
+        if !seen.insert(file.clone()) {
+            continue;
+        }
+        if dicom {
             files.insert(file.clone());
+        } else {
+            damaged += 1;
         }
     }
-    scan_headers(files, options)
+    let mut found = scan_headers(files, options)?;
+    found.extend((0..damaged).map(|_| Found::Damaged));
+    Ok(found)
 }
 
 /// Reads all headers in parallel; if there are several errors, that of the first file is reported.

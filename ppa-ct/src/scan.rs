@@ -98,7 +98,7 @@ pub enum WarningCode {
     LocalizersDropped,
     /// DICOM objects that are not images were left out.
     NonImagesDropped,
-    /// A DICOMDIR lists files that do not exist.
+    /// A DICOMDIR lists files that do not exist, or files named or listed as DICOM are empty or damaged.
     FilesMissing,
     /// No rescale slope and intercept: stored values are taken as HU.
     NoRescale,

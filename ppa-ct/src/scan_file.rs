@@ -69,6 +69,7 @@ impl ScanFile {
 
     /// Opens the data file that a header names; it must be next to the header.
     pub(crate) fn open_beside(&self, name: &str) -> Result<Self, ReadError> {
+        let name = name.strip_prefix("./").unwrap_or(name);
         let path = Path::new(name);
         let mut parts = path.components();
         let bare = matches!(

@@ -23,7 +23,7 @@ pub(crate) fn other_version(text: &str) -> Option<u32> {
 }
 
 /// `path` relative to `folder`, with `..` where they diverge. Absolute paths stay absolute; paths become absolute if the way out of
-/// `folder` is not known because it contains `..` itself.
+/// `folder` is not known because it contains `..` itself or leads through links.
 pub(crate) fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
     if path.is_absolute() {
         return Ok(path.to_owned());
@@ -41,7 +41,10 @@ pub(crate) fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileErr
         .take_while(|(a, b)| a == b)
         .count();
     let out_of = folder.components().skip(shared);
-    if out_of.clone().any(|part| part == Component::ParentDir) {
+    let links = folder.ancestors().take(out_of.clone().count());
+    if out_of.clone().any(|part| part == Component::ParentDir)
+        || links.clone().any(Path::is_symlink)
+    {
         return Ok(path);
     }
     let up = out_of.map(|_| Path::new(".."));
@@ -68,5 +71,19 @@ mod tests {
         let absolute = std::path::absolute("scan").unwrap();
         assert_eq!(see("scan", "../cases"), absolute);
         assert_eq!(see("scan", "a/../b"), absolute);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn paths_in_a_linked_folder_are_absolute() {
+        let base = tempfile::tempdir_in(".").unwrap();
+        let base = Path::new(base.path().file_name().unwrap());
+        std::fs::create_dir_all(base.join("disk/cases")).unwrap();
+        std::os::unix::fs::symlink("disk/cases", base.join("cases")).unwrap();
+        let scan = base.join("scan.nii");
+        let absolute = std::path::absolute(&scan).unwrap();
+        assert_eq!(relative_to(&scan, &base.join("cases")).unwrap(), absolute);
+        let inside = relative_to(&scan, &base.join("disk/cases")).unwrap();
+        assert_eq!(inside, Path::new("../../scan.nii"));
     }
 }

@@ -26,6 +26,9 @@ pub enum StudioError {
     /// A dataset, training runs or frames are open, but no limb.
     #[error("no limb is open")]
     NoLimb,
+    /// A change of a limb that is not open any more; the open case.
+    #[error("{} is open in another page, or since the program was started again: reload this page; nothing was changed", .0.display())]
+    OtherLimb(PathBuf),
     /// The plan names no case for a limb.
     #[error("the plan next to the dataset has no case for {0}")]
     NotInPlan(LimbId),

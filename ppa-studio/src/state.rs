@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 use ppa_dataset::layout::LimbId;
-use ppa_generate::{Case, Plan, PlanCase};
+use ppa_generate::{Case, Plan, PlanCase, original_case};
 
 use crate::case_file::new_plan;
 use crate::desk::Desk;
@@ -18,6 +18,7 @@ use crate::newest::Newest;
 use crate::opening::Opening;
 use crate::plan_file::PlanFile;
 use crate::plan_files::PlanFiles;
+use crate::plan_limbs::LimbChange;
 use crate::stoppable::Stoppable;
 use crate::token::Token;
 use crate::training_errors::TrainingErrors;
@@ -175,6 +176,32 @@ impl State {
         self.limb()?.edit(change)
     }
 
+    /// Overwrites the opened case with its changes. A plan with the file of the changes, which is removed, then has the case.
+    ///
+    /// # Errors
+    /// [`StudioError`] if a file cannot be written.
+    pub fn save_case(&self) -> Result<(), StudioError> {
+        let limb = self.limb()?;
+        let case = limb.shown().case.clone();
+        let original = {
+            let mut file = limb.case_file();
+            file.save(&case)?;
+            file.original().canonicalize().ok()
+        };
+        let has_edits = |planned: &PlanCase| {
+            let of = original_case(&planned.file).and_then(|of| of.canonicalize().ok());
+            of.is_some() && of == original
+        };
+        if let Some(number) = self.plan().cases.iter().position(has_edits) {
+            let change = LimbChange::Case {
+                number,
+                edits: false,
+            };
+            self.edit_plan(|file, text| file.with_limbs(text, &change))?;
+        }
+        Ok(())
+    }
+
     /// Returns the plan of the displayed room and exposure.
     pub fn plan(&self) -> Arc<Plan> {
         let plan = self.plan.lock();
@@ -240,13 +267,24 @@ impl State {
     /// Returns the displayed plan and its file, which is written if it does not exist.
     pub fn plan_on_disk(&self) -> Result<(PathBuf, Arc<Plan>), StudioError> {
         let mut file = self.plan_file();
-        if !file.current().exists() {
-            let text = file.text(|| self.case_on_disk())?;
-            let plan = Plan::of_text(&text, file.original())?;
-            file.save(&text)?;
-            self.show_plan(plan);
+        // Missing changes are those that the user removed.
+        if !file.has_edits() && !file.original().exists() {
+            self.write_plan(&mut file)?;
         }
         Ok((file.current().to_owned(), self.plan()))
+    }
+
+    /// Overwrites the opened plan with its changes.
+    pub fn save_plan(&self) -> Result<(), StudioError> {
+        self.write_plan(&mut self.plan_file())
+    }
+
+    fn write_plan(&self, file: &mut PlanFile) -> Result<(), StudioError> {
+        let text = file.text(|| self.case_on_disk())?;
+        let plan = file.plan(&text)?;
+        file.save(&text)?;
+        self.show_plan(plan);
+        Ok(())
     }
 
     /// Returns the folder of the opened dataset, or of a dataset next to the plan.

@@ -152,7 +152,7 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     if let Some(right) = &args.right {
         let (of_right, more, of_other) = open(right, Some(View::Right), args)?;
         anyhow::ensure!(
-            of_other == metadata,
+            of_other.mirror == metadata.mirror,
             "one of {} and {} was trained with mirror = true, the other was not",
             args.weights.display(),
             right.display()

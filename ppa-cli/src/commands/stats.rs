@@ -41,11 +41,20 @@ pub fn run(command: &StatsCommand, output: Output) -> anyhow::Result<()> {
     let test = sign_flip_permutation(&a, &b).with_context(file)?;
     output.print(&test, |test| {
         format!(
-            "mean difference {:.6}, p one-sided {:.6}, p two-sided {:.6}, {}",
+            "mean difference {:.6}, p one-sided {}, p two-sided {}, {}",
             number(test.mean_difference),
-            test.p_one_sided,
-            test.p_two_sided,
+            probability(test.p_one_sided),
+            probability(test.p_two_sided),
             count(test.patterns, "sign pattern")
         )
     })
+}
+
+/// Formats a probability of an exact test, which is never 0.
+fn probability(p: f64) -> String {
+    if p < 1e-6 {
+        format!("{p:.1e}")
+    } else {
+        format!("{p:.6}")
+    }
 }

@@ -9,6 +9,7 @@ use ppa_dataset::Findings;
 use ppa_generate::{Plan, verify};
 use serde::Serialize;
 
+use crate::commands::generate::plan_of;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::Output;
 use crate::progress::ProgressArgs;
@@ -43,7 +44,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     let path = match &args.plan {
         Some(path) => path.clone(),
         None => {
-            let beside = args.dataset.with_extension("toml");
+            let beside = plan_of(&args.dataset);
             anyhow::ensure!(
                 beside.exists(),
                 "{} does not exist; use --plan to give the plan that {} was made from",

@@ -104,6 +104,10 @@ fn a_dry_run_writes_scripts_without_slurm() {
     .unwrap();
     let said = succeed(here, &format!("{THREE} --cpus 1 --dry-run"));
     assert_eq!((&said["shards"], &said["units"]), (&2.into(), &4.into()));
+    // The scripts of the first dry run are replaced, not taken for edited ones.
+    let changed = fs::read_to_string(here.join("jobs/slurm/shard.sh")).unwrap();
+    assert_ne!(changed, script);
+    contains(&changed, &["--threads 1 generate"]);
     let report = succeed(here, "status jobs");
     assert_eq!(report["states"]["missing"], 2);
     assert_eq!(report["merge"]["state"], "missing");

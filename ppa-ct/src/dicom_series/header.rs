@@ -29,6 +29,8 @@ pub(super) enum Found {
     Directory(Listed),
     /// A report, a plan.
     NotAnImage,
+    /// A file that is named or listed as a slice, but does not begin as DICOM: empty or damaged.
+    Damaged,
 }
 
 /// The series of an image. The UID is used only to group and choose files, and is not kept.

@@ -15,6 +15,8 @@ pub(super) struct Sorted {
     others: usize,
     /// Number of missing files listed in a DICOMDIR.
     missing: usize,
+    /// Number of files that are named or listed as slices, but are not DICOM.
+    damaged: usize,
 }
 
 struct Member {
@@ -58,7 +60,7 @@ impl Sorted {
     /// Groups files by series.
     pub fn of(found: Vec<Found>) -> Self {
         let mut by_uid = BTreeMap::<String, (usize, Member)>::new();
-        let (mut localizers, mut others, mut missing) = (0, 0, 0);
+        let (mut localizers, mut others, mut missing, mut damaged) = (0, 0, 0, 0);
         for (order, item) in found.into_iter().enumerate() {
             let (series, slices, refused) = match item {
                 Found::Localizer => {
@@ -72,6 +74,10 @@ impl Sorted {
                 }
                 Found::NotAnImage => {
                     others += 1;
+                    continue;
+                }
+                Found::Damaged => {
+                    damaged += 1;
                     continue;
                 }
                 Found::OtherModality(series) => (series, Vec::new(), None),
@@ -95,6 +101,7 @@ impl Sorted {
             localizers,
             others,
             missing,
+            damaged,
         }
     }
 
@@ -123,6 +130,15 @@ impl Sorted {
             warnings.push(Warning {
                 code: WarningCode::FilesMissing,
                 text: format!("the DICOMDIR lists {} files that are missing", self.missing),
+            });
+        }
+        if self.damaged > 0 {
+            warnings.push(Warning {
+                code: WarningCode::FilesMissing,
+                text: format!(
+                    "{} named or listed as DICOM, but empty or damaged: slices may be missing",
+                    ppa_core::text::count(self.damaged, "file")
+                ),
             });
         }
         warnings

@@ -111,6 +111,24 @@ fn a_directory_of_the_medium_leads_to_its_files() {
     let codes: Vec<_> = scan.warnings.iter().map(|w| w.code).collect();
     assert!(codes.contains(&WarningCode::FilesMissing), "{codes:?}");
 
+    // Files that were emptied are no less missing, whether they are listed or named as slices.
+    let damaged = |path: &Path| {
+        let scan = read(path).unwrap();
+        assert_eq!(scan.volume, alone.volume);
+        let texts = scan.warnings.iter().map(|warning| &*warning.text);
+        texts
+            .filter(|text| text.contains("empty or damaged"))
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(damaged(&below), [""; 0]);
+    fs::write(below.join("MISSING"), "").unwrap();
+    fs::write(below.join("IM9.dcm"), [0; 200]).unwrap();
+    fs::write(below.join("._IM9.dcm"), "").unwrap();
+    let text = "1 file named or listed as DICOM, but empty or damaged: slices may be missing";
+    assert_eq!(damaged(&directory), [text]);
+    assert_eq!(damaged(&below), [text]);
+
     write_directory(&directory, &["GONE"]);
     let error = read(&directory).unwrap_err();
     assert!(

@@ -69,6 +69,7 @@ fn raw_packed_attached_and_detached_are_one() {
         attached(&["encoding: GZ"], &gz),
         detached(&[file], &voxels()),
         detached(&["datafile: v.raw"], &voxels()),
+        detached(&["data file: ./v.raw"], &voxels()),
         detached(&[file, "encoding: gzip"], &gz),
         detached(
             &[file, "line skip: 2"],

@@ -48,7 +48,7 @@ fn what_cannot_be_read_right_is_refused_by_name() {
         (vec!["data file: /etc/passwd"], "next to the header"),
         (vec!["data file: .\\v.raw"], "next to the header"),
         (vec!["data file: .."], "next to the header"),
-        (vec!["data file: ./v.raw"], "next to the header"),
+        (vec!["data file: ./../v.raw"], "next to the header"),
     ] {
         let error = attached(&changes, &voxels()).unwrap_err().to_string();
         assert!(error.contains(reason), "{changes:?}: {error}");

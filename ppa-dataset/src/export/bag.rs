@@ -168,13 +168,12 @@ fn list(root: &Path, below: &str, files: &mut Vec<String>) -> Result<(), BagErro
 }
 
 fn names_readers(path: &Path) -> io::Result<bool> {
-    if path.extension().is_none_or(|extension| extension != "csv") {
-        return Ok(false);
-    }
     let mut start = Vec::new();
     ppa_core::regular_file::open(path)?
         .take(64)
         .read_to_end(&mut start)?;
+    // Spreadsheets begin a file with a byte order mark.
+    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
     Ok(NOT_TO_BE_BAGGED
         .iter()
         .any(|header| start.starts_with(header)))

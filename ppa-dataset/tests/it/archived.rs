@@ -26,6 +26,9 @@ fn a_bag_holds_every_file_but_hidden_ones_with_its_hash() {
         "image,reader,grade\nx,anna,1\n",
     )
     .unwrap();
+    // By other programs, under another name.
+    let marked = "\u{feff}image,reader,grade\nx,anna,1\n";
+    fs::write(tree.path("grades.csv.old"), marked).unwrap();
     fs::write(tree.path("key.csv"), "name,image,sha256\n").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("bag");

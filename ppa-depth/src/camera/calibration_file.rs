@@ -113,7 +113,9 @@ impl CameraSpec {
             path: path.into(),
             source,
         };
-        let value: serde_json::Value = serde_json::from_str(&text).map_err(bad_json)?;
+        // The SDK's raw calibration ends with a NUL.
+        let text = text.trim_end_matches('\0');
+        let value: serde_json::Value = serde_json::from_str(text).map_err(bad_json)?;
         if value.get("CalibrationInformation").is_some() {
             let found: DeviceCalibration = serde_json::from_value(value).map_err(bad_json)?;
             found.camera(mode).map_err(refused)

@@ -69,11 +69,6 @@ impl<'a> Surface<'a> {
         ]
     }
 
-    /// Whether a pixel and its four neighbours lie on one surface.
-    pub(crate) fn is_smooth(&self, pixel: usize) -> bool {
-        self.image.z_mm[pixel] > 0.0 && self.neighbours(pixel).iter().all(Option::is_some)
-    }
-
     /// Unit normal towards the camera, from the neighbours on the same surface; `None` if there are too few.
     #[inline]
     pub(crate) fn normal(&self, pixel: usize) -> Option<Vector3<f64>> {

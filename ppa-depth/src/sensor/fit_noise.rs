@@ -2,7 +2,8 @@
 
 use crate::camera::projection::Camera;
 use crate::image::{DepthError, DepthImage};
-use crate::render::surface::{Surface, signal};
+use crate::render::surface::signal;
+use crate::sensor::local_plane::{MeanDepth, local_plane};
 use crate::sensor::spec::RandomError;
 
 /// Random error fitted to a recording, and quality of the fit.
@@ -61,8 +62,9 @@ const ROUNDING_MM2: f64 = 1.0 / 12.0;
 
 /// Fits variance = floor² + (at_unit_signal / S)² to the spread of every pixel over the frames of a still scene.
 ///
-/// `whole_mm`: the frames were rounded to millimetres, as 16-bit PNGs are; the variance of rounding is then subtracted. Pixels at
-/// edges are excluded, since they mix surfaces. The signal is that of diffuse surfaces of one reflectivity. Constant offsets of
+/// `whole_mm`: the frames were rounded to millimetres, as 16-bit PNGs are; the variance of rounding is then subtracted. The angle of
+/// incidence of a pixel is that of a plane through its surroundings of 9 x 9 pixels; pixels at edges are excluded, since they mix
+/// surfaces. The signal is that of diffuse surfaces of one reflectivity. Constant offsets of
 /// the device cannot be found from such a recording.
 ///
 /// # Errors
@@ -80,40 +82,29 @@ pub fn fit_noise(
             .check_camera(camera)
             .map_err(|source| FitError::Size { frame, source })?;
     }
-    let count = frames.len() as f64;
-    let mean = DepthImage {
-        width: camera.width(),
-        height: camera.height(),
-        z_mm: (0..camera.rays().len())
-            .map(|pixel| {
-                let depths = frames.iter().map(|frame| f64::from(frame.z_mm[pixel]));
-                let valid = depths.clone().filter(|z| *z > 0.0).count();
-                (depths.sum::<f64>() / valid.max(1) as f64) as f32
-            })
-            .collect(),
-    };
-    let surface = Surface::new(camera, &mean);
+    let (depths, valid) = means(frames);
     // Signal, variance of the range, share of frames without a depth.
     let mut pixels = Vec::new();
     let mut always = 0;
-    for (pixel, &z_mm) in mean.z_mm.iter().enumerate() {
-        let Some(ray) = surface.ray_length(pixel) else {
+    for (pixel, (depth, &valid)) in depths.iter().zip(&valid).enumerate() {
+        let (Some(ray), true) = (camera.rays()[pixel], valid > 0) else {
             continue;
         };
-        if !surface.is_smooth(pixel) {
+        let Some(plane) = local_plane(camera, &depths, pixel) else {
             continue;
-        }
-        let depths = frames.iter().map(|frame| frame.z_mm[pixel]);
-        let lost = depths.clone().filter(|z| *z <= 0.0).count() as f64 / count;
-        let of_mean = |z: f32| f64::from(z - z_mm).powi(2);
-        let spread = depths.filter(|z| *z > 0.0).map(of_mean).sum::<f64>();
-        let s = signal(surface.cos_incidence(pixel), f64::from(z_mm) * ray);
-        let variance = (lost == 0.0).then(|| {
-            always += 1;
-            let rounding = if whole_mm { ROUNDING_MM2 } else { 0.0 };
-            (spread / (count - 1.0) - rounding) * ray * ray
-        });
-        pixels.push((s, variance, lost));
+        };
+        let ray = (1.0 + ray.norm_squared()).sqrt();
+        let s = signal(plane.cos_incidence, plane.z_mm * ray);
+        let count = frames.len();
+        let variance = depth
+            .variance_mm2
+            .filter(|_| valid == count)
+            .map(|of_mean| {
+                always += 1;
+                let rounding = if whole_mm { ROUNDING_MM2 } else { 0.0 };
+                (count as f64 * of_mean - rounding) * ray * ray
+            });
+        pixels.push((s, variance, 1.0 - valid as f64 / count as f64));
     }
     if always < 1000 {
         return Err(FitError::Pixels(always));
@@ -158,6 +149,21 @@ pub fn fit_noise(
         relative_misfit: (rows.iter().map(misfit).sum::<f64>() / rows.len() as f64).sqrt(),
         classes: rows,
     })
+}
+
+/// Mean depths of the frames with a depth, and the numbers of those frames.
+fn means(frames: &[DepthImage]) -> (Vec<MeanDepth>, Vec<usize>) {
+    let of_pixel = |pixel: usize| {
+        let depths = frames.iter().map(|frame| f64::from(frame.z_mm[pixel]));
+        let depths = depths.filter(|z| *z > 0.0);
+        let valid = depths.clone().count();
+        let count = valid as f64;
+        let z_mm = depths.clone().sum::<f64>() / count.max(1.0);
+        let spread = depths.map(|z| (z - z_mm).powi(2)).sum::<f64>();
+        let variance_mm2 = (valid > 1).then(|| spread / (count - 1.0) / count);
+        (MeanDepth { z_mm, variance_mm2 }, valid)
+    };
+    (0..frames[0].z_mm.len()).map(of_pixel).unzip()
 }
 
 /// Least squares of y = a + b x with weights 1/y², since the spread of a variance is proportional to it; a and b are at least 0.

@@ -1,6 +1,7 @@
 //! Errors of a Time-of-Flight sensor, and their fit to a recording.
 
 pub(crate) mod fit_noise;
+pub(crate) mod local_plane;
 pub(crate) mod modulation;
 pub(crate) mod multipath;
 pub(crate) mod observe;

@@ -59,6 +59,10 @@ fn device_orbbec_and_opencv_files_tell_the_same_camera() {
     let ours = CameraSpec::azure_kinect(DepthMode::NfovUnbinned);
     let device = import("raw.json", DEVICE, DepthMode::NfovUnbinned).unwrap();
     assert_eq!(device.metric_radius, ours.metric_radius);
+    // The SDK writes the calibration with its final NUL.
+    let terminated = format!("{DEVICE}\0");
+    let same = import("raw.json", &terminated, DepthMode::NfovUnbinned).unwrap();
+    assert_eq!(same, device);
     same_camera(&device, &ours);
     let opencv = import("camera.yml", OPENCV, DepthMode::WfovBinned).unwrap();
     assert_eq!(opencv.metric_radius, None);

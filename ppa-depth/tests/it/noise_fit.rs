@@ -69,6 +69,34 @@ fn the_noise_of_a_recording_is_found_again() {
     ));
 }
 
+/// Far away, the noise of neighbouring pixels exceeds their distance; it must not enter the angle of incidence.
+#[test]
+fn the_noise_of_few_frames_far_away_is_unbiased() {
+    let camera = Camera::try_from(pinhole(200, 504.0)).unwrap();
+    let steep = [(-2e3, -2e3), (2e3, -2e3), (2e3, 2e3), (-2e3, 2e3)]
+        .map(|(x, y)| Point3::new(x, y, 2500.0 + 2.0 * x));
+    let body = Body::from(MeshBody::new(&steep, &[[0, 1, 2], [0, 2, 3]]).unwrap());
+    let seen = view(&camera, &[], &body);
+    let noisy = sensor(SensorSpec {
+        random: Some(RandomError {
+            floor_mm: 0.0,
+            at_unit_signal_mm: 1.14,
+        }),
+        ..NONE
+    });
+    for count in [3, 10] {
+        let frames = (0..count).map(|frame| noisy.observe(&camera, &seen, 3, frame).unwrap());
+        let fit = fit_noise(&camera, &frames.collect::<Vec<_>>(), false).unwrap();
+        let RandomError {
+            floor_mm,
+            at_unit_signal_mm,
+        } = fit.random;
+        assert!((at_unit_signal_mm / 1.14 - 1.0).abs() < 0.03, "{fit:?}");
+        // Of a noise of 10 to 40 mm.
+        assert!(floor_mm < 1.5, "{fit:?}");
+    }
+}
+
 /// Pixels that are rejected below a signal are missing in every frame; the signals of a class of pixels are some 5 % apart.
 #[test]
 fn the_least_signal_of_a_recording_is_found_again() {

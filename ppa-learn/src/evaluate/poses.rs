@@ -23,7 +23,7 @@ pub struct PoseRow {
     pub angle_deg: Option<f64>,
     /// Number of images of all cameras and frames.
     pub images: usize,
-    /// Mean label of the images.
+    /// Label of the images.
     pub label: f64,
     /// Mean prediction of the images.
     pub prediction: f64,
@@ -49,7 +49,8 @@ pub fn poses(rows: &[Row]) -> Vec<PoseRow> {
             pose: pose.clone(),
             angle_deg: rows[0].angle_deg,
             images: rows.len(),
-            label: mean(|row| row.label),
+            // The same for all images. Their mean differs in the last digit, which is no tie for rank correlations.
+            label: rows[0].label,
             prediction: mean(|row| row.prediction),
             frame_spread: frame_spread(rows.iter().copied()),
         }
@@ -99,4 +100,34 @@ pub fn triples(poses: &[PoseRow]) -> Option<Vec<PoseTriple>> {
         limbs.entry(limb).or_default().push(pair);
     }
     limbs.values().map(|poses| triple(poses)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ppa_dataset::layout::View;
+
+    use super::*;
+
+    /// The sum of ten labels of 5/3 divided by ten is not 5/3, as that of six is.
+    #[test]
+    fn equal_labels_of_poses_are_equal() {
+        let row = |pose: &str| Row {
+            id: String::new(),
+            dataset: 1,
+            camera: View::Left,
+            patient: 3,
+            side: Side::Right,
+            pose: pose.to_owned(),
+            frame: 0,
+            angle_deg: None,
+            label: 5.0 / 3.0,
+            prediction: 2.0,
+            correction_deg: None,
+            predicted_correction_deg: None,
+        };
+        let rows = [vec![row("a"); 10], vec![row("b"); 6]].concat();
+        let poses = poses(&rows);
+        assert_eq!(poses.len(), 2);
+        assert!(poses.iter().all(|pose| pose.label == 5.0 / 3.0));
+    }
 }

@@ -106,6 +106,8 @@ pub(crate) fn sentence(network_mae: f64, baselines: &[Compared], persons: usize)
         Verdict::Better => {
             let p = baselines.iter().map(|b| b.p_network_better);
             let p = p.fold(0.0, f64::max);
+            // Rounded up, since it is a bound.
+            let p = (1000.0 * p).ceil() / 1000.0;
             format!(
                 "The network (MAE {network_mae:.3}) is better than every baseline, p at most {p:.3} over {persons}."
             )
@@ -153,8 +155,13 @@ mod tests {
             worse.contains("not lower than that of: mean by true angle 0.200."),
             "{worse}"
         );
-        let surely = compared(BaselineKind::KernelRidge, 0.3, 0.031);
+        let surely = compared(BaselineKind::KernelRidge, 0.3, 0.0313);
         assert_eq!(verdict(0.25, &[surely]), Verdict::Better);
+        let better = sentence(0.25, &[surely], 5);
+        assert!(
+            better.ends_with("p at most 0.032 over 5 persons."),
+            "{better}"
+        );
     }
 
     #[test]

@@ -319,7 +319,16 @@ impl<'a> Runner<'a> {
         if !finished.exists() {
             return Ok(None);
         }
-        if read_json::<Record>(&finished)?.config != without_paths(&self.config(training)?) {
+        let config = self.config(training)?;
+        let data = |sources: &[Source]| {
+            samples(&config, sources).map_err(|source| ExperimentError::Training {
+                training: training.to_string(),
+                source: Box::new(source),
+            })
+        };
+        let data_sha256 = fingerprint(&[data(&config.training)?, data(&config.evaluation)?]);
+        let record: Record = read_json(&finished)?;
+        if record.config != without_paths(&config) || record.data_sha256 != data_sha256 {
             return Err(ExperimentError::OtherSettings(folder));
         }
         let path = folder.join("predictions.csv");

@@ -119,6 +119,15 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
     runner.add_baselines(&mut results).unwrap();
     assert_eq!(results.comparisons(), first);
 
+    // Other folds may test other persons: those results are refused too.
+    let refused = (1..20).filter(|&seed| {
+        let mut other = plan.clone();
+        other.fold_seed = seed;
+        let runner = Runner::new(&other, Experiment::TwoC, &root).unwrap();
+        matches!(runner.results(), Err(ExperimentError::OtherSettings(_)))
+    });
+    assert!((1..19).contains(&refused.count()));
+
     // Another number of steps would be another experiment.
     let other = self::plan(folder.path(), &synthetic, &preparations, 4);
     let other = Runner::new(&other, Experiment::TwoC, &root).unwrap();

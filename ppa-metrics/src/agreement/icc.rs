@@ -180,9 +180,15 @@ impl MeanSquares {
                 + (b * residual).powi(2) / ((n - 1.0) * (k - 1.0)));
         let below = f_quantile(n - 1.0, freedom);
         let above = f_quantile(freedom, n - 1.0);
+        let low = if below.is_finite() {
+            n * (subjects - below * residual) / (below * error + n * subjects)
+        } else {
+            // The limit, if freedom is so low that the quantile exceeds all numbers.
+            -n * residual / error
+        };
         Icc {
             value,
-            low: n * (subjects - below * residual) / (below * error + n * subjects),
+            low,
             high: n * (above * subjects - residual) / (error + n * above * subjects),
         }
     }
@@ -243,6 +249,22 @@ mod tests {
             [0.909_315_542_4, 0.675_674_71, 0.985_891_68],
         ];
         assert_equal(found, expected);
+    }
+
+    /// Readers who disagree strongly leave almost no degrees of freedom, and limits that are numbers.
+    #[test]
+    fn strong_disagreement_has_finite_limits() {
+        for rows in [[[2.5, 2.0], [1.0, 3.0]], [[1.0, 3.0], [3.0, 1.5]]] {
+            let found = forms(&[&rows[0], &rows[1]]);
+            for form in [found.agreement_single, found.agreement_mean] {
+                let limits = [form.low, form.value, form.high];
+                assert!(limits.iter().all(|limit| limit.is_finite()), "{form:?}");
+                assert!(
+                    form.low <= form.value && form.value <= form.high,
+                    "{form:?}"
+                );
+            }
+        }
     }
 
     /// Half-step grades of four readers that agree well; expected: `pingouin.intraclass_corr` 0.7.0.

@@ -48,6 +48,9 @@ const KEPT: f64 = 0.4;
 /// Contacts of a tilted limb that lie closer to each other along the table are one, mm.
 const ONE_PLACE_MM: f64 = 10.0;
 
+/// Contacts that lie closer to each other along the table determine nothing beyond them, mm.
+const NEAR_MM: f64 = 50.0;
+
 /// Deformation of the soft tissue of a limb that was placed a depth s into the table.
 ///
 /// A layer of thickness T = 2 s / (1 − a), a = 0.4, is pressed into its upper T − s. With
@@ -56,8 +59,9 @@ const ONE_PLACE_MM: f64 = 10.0;
 /// ζ′ = a + (1 − a) u; lengths across the table become (x − x₀) / ζ′ about the line x₀ through
 /// both contacts. The tissue swells sideways by as much as it is pressed: the Jacobian is
 /// ζ′ · 1/ζ′ = 1, so that no volume is lost, and no two points meet. Above the layer nothing moves.
-/// s is linear along the table from one contact to the other and beyond, but not below 0. If a limb is tilted, a part that is
-/// lifted does not sink in, s keeps its values at the contacts beyond them, and points deeper than s are moved onto the table.
+/// s is linear along the table from one contact to the other and beyond, but not below 0. If a limb is tilted, or its contacts are
+/// less than 50 mm apart, a part that is lifted does not sink in, s and x₀ keep their values at the contacts beyond them, and points
+/// deeper than s are moved onto the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flattening {
@@ -70,7 +74,7 @@ pub struct Flattening {
     depth_per_mm: f64,
     /// Shift of the line through both contacts across the table per mm towards the head.
     across_per_mm: f64,
-    /// Distance between the contacts along the table for a tilted limb, mm.
+    /// Distance between the contacts along the table for a tilted limb, or one with near contacts, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     apart_mm: Option<f64>,
 }
@@ -90,7 +94,7 @@ impl Flattening {
         );
         let depths = [&distal, &proximal].map(|p| -table.signed_distance(p));
         let apart = room_from_contact.inverse_transform_point(&proximal);
-        if is_tilted {
+        if is_tilted || apart.y < NEAR_MM {
             let depths = depths.map(|depth| depth.max(0.0));
             // Lowest points next to each other: the entire limb sinks in equally.
             let is_one_place = apart.y < ONE_PLACE_MM;
@@ -136,5 +140,35 @@ impl Flattening {
         let line = self.across_per_mm * along;
         at.x = line + (at.x - line) / slope;
         self.room_from_contact * at
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// Contacts 6 mm apart along the table and 5 mm across it, as under a convex limb that rests on its middle.
+    #[test]
+    fn near_contacts_move_nothing_far_from_them() {
+        let table = Plane {
+            normal: Vector3::z_axis(),
+            offset_mm: 0.0,
+        };
+        let contacts = [Point3::new(0.0, 0.0, -4.0), Point3::new(5.0, 6.0, -3.0)];
+        let flattening = Flattening::at(contacts, &table, &Matrix3::identity(), false);
+        for y in [-140.0, -74.0, 3.0, 150.0] {
+            for x in [-40.0, -3.0, 0.0, 8.0] {
+                let moved = flattening.flattened(&Point3::new(x, y, 1.0));
+                // Away from the contacts by at most 1 / 0.4.
+                let line = if x < 0.0 { 5.0 } else { 0.0 };
+                assert!(
+                    (moved.x - line).abs() <= (x - line).abs() / KEPT + 1e-9,
+                    "{x}, {y}: {moved}"
+                );
+                assert!((-1e-9..=4.0).contains(&moved.z), "{x}, {y}: {moved}");
+            }
+        }
     }
 }

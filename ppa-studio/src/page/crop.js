@@ -17,8 +17,8 @@ export function box(store) {
 }
 
 // Returns the crop of the case: null for the entire scan.
-export function cropOf(store, shown) {
-  return JSON.stringify(shown) === JSON.stringify(whole(store.doc.grid)) ? null : shown;
+export function cropOf({ grid }, shown) {
+  return JSON.stringify(shown) === JSON.stringify(whole(grid)) ? null : shown;
 }
 
 // Returns the edges of a box in a slice, CSS pixels: [left or right, ...] and [upper or lower, ...], low end first.
@@ -48,16 +48,18 @@ export function grabCrop(view, shown, at, l) {
   return null;
 }
 
-// Returns the box with an edge moved to before a voxel of an axis; at least one voxel is left.
-export function moveCrop({ size }, shown, { cropAxis, end }, border) {
-  const next = { low: [...shown.low], high: [...shown.high] };
+// Returns the box of the case with an edge moved to before a voxel of an axis; at least one voxel is left.
+export function moveCrop({ grid, crop }, { cropAxis, end }, border) {
+  const { size } = grid;
+  const { low, high } = crop ?? whole(grid);
+  const next = { low: [...low], high: [...high] };
   if (end === "low") next.low[cropAxis] = Math.max(0, Math.min(next.high[cropAxis] - 1, border));
   else next.high[cropAxis] = Math.min(size[cropAxis], Math.max(next.low[cropAxis] + 1, border));
   return next;
 }
 
 export class CropPanel {
-  // `actions.crop` takes a box, or null for the entire scan; `actions.redraw` redraws the slices.
+  // `actions.crop` takes a function that returns the box for a document, or null for the entire scan; `actions.redraw` redraws the slices.
   constructor(store, actions) {
     this.store = store;
     this.actions = actions;
@@ -89,8 +91,8 @@ export class CropPanel {
   typed(axis, end, value) {
     // An empty field changes nothing.
     if (Number.isNaN(value)) return this.show();
-    const { grid, crop } = this.store.doc;
-    this.actions.crop(moveCrop(grid, crop ?? whole(grid), { cropAxis: axis, end }, Math.round(end === "low" ? value : value + 1)));
+    const border = Math.round(end === "low" ? value : value + 1);
+    this.actions.crop((doc) => moveCrop(doc, { cropAxis: axis, end }, border));
   }
 
   show() {

@@ -77,14 +77,14 @@ export class LandmarkPanel {
       at,
       onSkin,
       move: (place) => {
-        this.moving = place && changed(place);
+        this.moving = place && changed(place, this.store.doc.landmarks);
         this.actions.landmarks();
       },
-      drop: (place) => this.actions.choose(changed(place)),
+      drop: (place) => this.actions.choose((found) => changed(place, found)),
     });
     return [
       handle(landmarks.joint_centre, false, (place) => ({ joint_centre: place })),
-      ...landmarks.plane_points.map((at, corner) => handle(at, true, (place) => ({ plane_points: landmarks.plane_points.with(corner, place) }))),
+      ...landmarks.plane_points.map((at, corner) => handle(at, true, (place, { plane_points }) => ({ plane_points: plane_points.with(corner, place) }))),
     ];
   }
 

@@ -52,6 +52,11 @@ export class LivePanel {
     this.poll(this.display);
   }
 
+  // Called when the program was restarted: it counts pairs from 1 again.
+  forget() {
+    this.number = 0;
+  }
+
   hide() {
     this.display += 1;
     clearInterval(this.clock);

@@ -31,7 +31,7 @@ const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200
 
 // Makes changes in the order of the user's actions.
 const change = inTurn(send);
-const actions = { change, choose, crosshair, landmarks: drawLandmarks, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: newest(showImageCommands), prediction: showPrediction };
+const actions = { change, choose, crosshair, landmarks: drawLandmarks, crop: (move) => change("surface", (doc) => ({ crop: move && cropOf(doc, move(doc)) })), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: newest(showImageCommands), prediction: showPrediction };
 
 const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) => new SliceView(figure, store, actions));
 const view3d = new View3d(byId("view3d"), actions);
@@ -80,7 +80,8 @@ async function send(path, body) {
   document.body.setAttribute("aria-busy", "true");
   const slow = setTimeout(() => tell("computing …"), 300);
   try {
-    await show(await postJson(path, typeof body === "function" ? body(store.doc) : body));
+    const limb = encodeURIComponent(store.doc.files.original);
+    await show(await postJson(`${path}?limb=${limb}`, typeof body === "function" ? body(store.doc) : body));
     tell("");
   } catch (error) {
     fail(error);
@@ -355,6 +356,7 @@ async function begin() {
 // Called when the program answers again. A restarted program has the saved state.
 async function refresh(restarted) {
   try {
+    if (restarted) live.forget();
     allow(await getJson("opened"));
     if (opened.limb && store.doc) await show(await getJson("state"));
     go(store.step);
@@ -394,7 +396,9 @@ function listen() {
     if (!is_saved || window.confirm(`Replace ${original} with the changed case?`)) change("save");
   });
   document.addEventListener("keydown", (event) => {
-    if (!event.ctrlKey || event.target.matches("input[type=number]") || byId("grading").open) return;
+    // In a field, the keys undo what was typed.
+    const types = event.target.matches("textarea, input:not([type=range], [type=checkbox])");
+    if (!event.ctrlKey || types || !OF_LIMB.includes(store.step)) return;
     if (event.key === "z" && store.doc?.can_undo) change("undo");
     if (event.key === "y" && store.doc?.can_redo) change("redo");
   });

@@ -268,24 +268,25 @@ export class SliceView {
       const { cropAxis, beside } = this.held;
       const edge = this.toVoxel([at[0] - beside[0], at[1] - beside[1]]);
       const border = Math.round(edge[cropAxis] + 0.5);
-      this.held.crop = moveCrop(grid, this.held.crop ?? box(this.store), this.held, border);
+      const { held } = this;
+      held.move = (doc) => moveCrop(doc, held, border);
+      held.crop = held.move(this.store.doc);
       return;
     }
     const { key, corner, end } = this.held;
     if (end !== undefined) {
-      const range = [...landmarks[key].range_mm];
-      range[end] = Math.round(10 * this.along(voxel)) / 10;
-      this.held.changed = { [key]: { ...landmarks[key], range_mm: range } };
-      this.held.choice = { [key]: range };
+      const mm = Math.round(10 * this.along(voxel)) / 10;
+      const range = (found) => found[key].range_mm.with(end, mm);
+      this.held.changed = { [key]: { ...landmarks[key], range_mm: range(landmarks) } };
+      this.held.choice = (found) => ({ [key]: range(found) });
       return;
     }
     // Moves within the slice; keeps the coordinate across it.
     const old = corner === undefined ? landmarks[key] : landmarks[key][corner];
     voxel[this.axis] = transform(inverse(grid.ct_from_voxel), old)[this.axis];
     const point = transform(grid.ct_from_voxel, voxel).map((x) => Math.round(10 * x) / 10);
-    const value = corner === undefined ? point : landmarks[key].map((p, i) => (i === corner ? point : p));
-    this.held.changed = { [key]: value };
-    this.held.choice = { [key]: value };
+    this.held.choice = (found) => ({ [key]: corner === undefined ? point : found[key].with(corner, point) });
+    this.held.changed = this.held.choice(landmarks);
   }
 
   press(event) {
@@ -324,7 +325,7 @@ export class SliceView {
     const held = this.held;
     this.held = null;
     if (held?.choice) this.actions.choose(held.choice);
-    if (held?.crop && JSON.stringify(held.crop) !== JSON.stringify(box(this.store))) this.actions.crop(held.crop);
+    if (held?.crop && JSON.stringify(held.crop) !== JSON.stringify(box(this.store))) this.actions.crop(held.move);
   }
 
   turn(event) {

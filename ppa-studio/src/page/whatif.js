@@ -23,6 +23,9 @@ const SLIDERS = [
   { key: "mas", label: "Tube load", unit: " mAs", min: 0.1, max: 20, step: 0.1 },
 ];
 
+// Sliders of the tube.
+const OF_EXPOSURE = ["kvp", "aluminium_mm", "mas"];
+
 const gutterText = (gutter) => `${gutter.name} gutter ${fixed(100 * gutter.openness, 0)} % open, grade ${fixed(gutter.grade)}`;
 
 const TECHNIQUES = ["ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbow"];
@@ -85,7 +88,7 @@ export class WhatIfPanel {
     form.append(label);
   }
 
-  // Makes a slider, which shows the value of the plan until it is moved.
+  // Makes a slider, which shows the value of the technique or the plan until it is moved.
   slider({ key, label, unit, min, max, step, start }) {
     const row = document.createElement("div");
     row.className = "row";
@@ -99,8 +102,9 @@ export class WhatIfPanel {
       const planned = this.planned(key);
       if (value === undefined && planned !== undefined) input.value = planned;
       const shown = value ?? planned;
-      const text = shown === undefined ? "set by the histories" : `${fixed(shown, step < 1 ? 1 : 0)}${unit}`;
-      output.textContent = value === undefined ? `${text}, from the plan` : text;
+      const text = shown === undefined ? this.otherwise(key) : `${fixed(shown, step < 1 ? 1 : 0)}${unit}`;
+      const source = this.technique && OF_EXPOSURE.includes(key) ? "technique" : "plan";
+      output.textContent = value === undefined ? `${text}, from the ${source}` : text;
     };
     this.sliders.push(show);
     input.addEventListener("input", () => {
@@ -115,14 +119,29 @@ export class WhatIfPanel {
     return row;
   }
 
-  // Returns the value of the plan, if it is a number for a slider.
-  planned(key) {
+  // Returns the exposure of the technique or the plan.
+  exposure() {
     const planned = this.store.doc?.planned;
-    if (!planned) return undefined;
-    if (key === "mas") return planned.tube_load?.mas;
-    if (key !== "aluminium_mm") return planned[key];
-    const [only, ...others] = planned.filters;
-    return others.length === 0 && only?.startsWith("Al:") ? Number(only.slice(3)) : undefined;
+    return planned?.techniques[this.technique] ?? planned?.exposure;
+  }
+
+  // Returns the value of the technique or the plan, if it is a number for a slider.
+  planned(key) {
+    const exposure = this.exposure();
+    if (!exposure) return undefined;
+    if (!OF_EXPOSURE.includes(key)) return this.store.doc.planned[key];
+    if (key === "kvp") return exposure.kvp;
+    if (key === "mas") return exposure.tube_load?.mas;
+    const [only, ...others] = exposure.filters;
+    if (!only) return 0;
+    return others.length === 0 && only.startsWith("Al:") ? Number(only.slice(3)) : undefined;
+  }
+
+  // Describes filters or a tube load that no slider shows.
+  otherwise(key) {
+    const exposure = this.exposure();
+    if (key === "aluminium_mm") return exposure?.filters.join(", ") ?? "";
+    return exposure?.tube_load ? "set by the exposure index" : "set by the histories";
   }
 
   show() {
@@ -138,7 +157,7 @@ export class WhatIfPanel {
     const input = document.createElement("select");
     input.id = id;
     for (const [value, text] of options) input.append(new Option(text, value));
-    input.addEventListener("change", () => { set(input.value); this.changed(); });
+    input.addEventListener("change", () => { set(input.value); this.show(); this.changed(); });
     row.append(name, input);
     return row;
   }

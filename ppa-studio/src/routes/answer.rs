@@ -41,6 +41,7 @@ pub(super) fn failed(error: StudioError) -> Response {
         StudioError::Superseded
         | StudioError::ChangedElsewhere(_)
         | StudioError::Exists(_)
+        | StudioError::OtherLimb(_)
         | StudioError::Generating(_) => StatusCode::CONFLICT,
         _ => StatusCode::UNPROCESSABLE_ENTITY,
     };

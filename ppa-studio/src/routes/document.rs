@@ -1,20 +1,22 @@
 //! The limb with its landmarks: state, changes, undo and saving.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::State as Extracted;
+use axum::extract::{Query, Request, State as Extracted};
+use axum::middleware::Next;
 use axum::response::Response;
 use ppa_dataset::files::write_whole;
 use ppa_dataset::{Finding, FindingCode};
-use ppa_generate::{Case, SceneSetupError};
+use ppa_generate::{Case, SceneSetupError, Technique, XraySettings};
 use ppa_mesh::{Ball, LimbReport, VoxelBox};
 use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Side};
 use ppa_xray::TubeLoad;
 use serde::{Deserialize, Serialize};
 
-use super::answer::work;
+use super::answer::{failed, work};
 use crate::commands::{self, Commands};
 use crate::error::StudioError;
 use crate::state::State;
@@ -64,9 +66,32 @@ struct Planned {
     tilt_deg: f64,
     beam_across_mm: f64,
     beam_along_mm: f64,
+    exposure: Exposure,
+    /// Exposures of the techniques, by name.
+    techniques: BTreeMap<&'static str, Exposure>,
+}
+
+#[derive(Serialize)]
+struct Exposure {
     kvp: f64,
     filters: Vec<String>,
     tube_load: Option<TubeLoad>,
+}
+
+impl Exposure {
+    fn of(settings: &XraySettings) -> Self {
+        Self {
+            kvp: settings.kvp,
+            filters: settings.filters.clone(),
+            tube_load: settings.tube_load,
+        }
+    }
+
+    fn of_technique(technique: Technique) -> Self {
+        let mut settings = XraySettings::default();
+        technique.apply(&mut settings);
+        Self::of(&settings)
+    }
 }
 
 #[derive(Serialize)]
@@ -92,6 +117,28 @@ type Answer = Result<Json<Document>, Response>;
 
 pub(super) async fn state(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| document(state).map(Json)).await
+}
+
+/// The limb of a page.
+#[derive(Deserialize)]
+pub(super) struct OfPage {
+    /// File of its case, as in [`Files::original`].
+    limb: Option<String>,
+}
+
+/// Refuses changes by a page that shows another limb: another page may have opened one, or the program was restarted.
+pub(super) async fn of_open_limb(
+    Extracted(state): Extracted<Arc<State>>,
+    Query(OfPage { limb: shown }): Query<OfPage>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Response> {
+    let open = state.limb().map_err(failed)?;
+    let open = open.case_file().original().to_owned();
+    if shown.is_some_and(|shown| shown != open.to_string_lossy()) {
+        return Err(failed(StudioError::OtherLimb(open)));
+    }
+    Ok(next.run(request).await)
 }
 
 /// Sets the landmark choices; landmarks of absent keys are found automatically.
@@ -197,9 +244,7 @@ pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
 /// Overwrites the opened case.
 pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
-        let limb = state.limb()?;
-        let case = limb.shown().case.clone();
-        limb.case_file().save(&case)?;
+        state.save_case()?;
         document(state).map(Json)
     })
     .await
@@ -327,9 +372,10 @@ pub(super) fn document(state: &State) -> Result<Document, StudioError> {
             tilt_deg: plan.positioning.tilt_deg,
             beam_across_mm: plan.positioning.beam_shift_mm[0],
             beam_along_mm: plan.positioning.beam_shift_mm[1],
-            kvp: plan.xray.kvp,
-            filters: plan.xray.filters.clone(),
-            tube_load: plan.xray.tube_load,
+            exposure: Exposure::of(&plan.xray),
+            techniques: Technique::ALL
+                .map(|(name, technique)| (name, Exposure::of_technique(technique)))
+                .into(),
         },
     })
 }

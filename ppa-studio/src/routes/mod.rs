@@ -27,8 +27,7 @@ use crate::state::State;
 const MAX_BODY: usize = 64 * 1024;
 
 pub(crate) fn router(state: Arc<State>) -> Router {
-    let api = Router::new()
-        .route("/state", get(document::state))
+    let changes = Router::new()
         .route("/choices", post(document::choices))
         .route("/surface", post(document::surface))
         .route("/body", post(document::body))
@@ -36,6 +35,9 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/undo", post(document::undo))
         .route("/redo", post(document::redo))
         .route("/save", post(document::save))
+        .route_layer(from_fn_with_state(state.clone(), document::of_open_limb));
+    let api = changes
+        .route("/state", get(document::state))
         .route("/plan", post(document::plan))
         .route("/cameras", post(document::cameras))
         .route("/slice/{axis}/{index}", get(scan::slice))

@@ -142,10 +142,7 @@ pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
 /// Overwrites the opened plan.
 pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
-        let mut file = state.plan_file();
-        let text = file.text(|| state.case_on_disk())?;
-        file.save(&text)?;
-        drop(file);
+        state.save_plan()?;
         plan_form(state).map(Json)
     })
     .await

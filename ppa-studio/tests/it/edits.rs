@@ -61,6 +61,43 @@ fn changes_are_taken_up_again_by_the_next_studio() {
 }
 
 #[test]
+fn a_page_with_another_limb_changes_nothing() {
+    let browser = Browser::new();
+    let before = browser.get("/api/state").json();
+    let joint = json!({ "joint_centre": [1.0, 2.0, 3.0] });
+    let refused = browser.post("/api/choices?limb=p02.case.toml", &joint);
+    assert_eq!(refused.status, StatusCode::CONFLICT);
+    assert!(
+        refused
+            .text()
+            .contains("p01.case.toml is open in another page")
+    );
+    assert_eq!(browser.get("/api/state").json(), before);
+    let shown = before["files"]["original"].as_str().unwrap();
+    let path = format!("/api/choices?limb={shown}");
+    let after = browser.post(&path, &json!({ "joint_region": [8.0, 20.0] }));
+    assert_eq!(after.json()["can_undo"], true);
+}
+
+#[test]
+fn a_plan_keeps_its_case_when_the_changes_replace_it() {
+    let browser = Browser::new();
+    let region = json!({ "joint_region": [8.0, 20.0] });
+    browser.post("/api/choices", &region).json();
+    let plan = browser.post("/api/plan/save", &json!({})).json();
+    assert_eq!(plan["limbs"][0]["case"], "p01.edited.case.toml");
+    // The saved plan is in use: its limb can be opened.
+    let limb = json!({ "patient": 0, "side": "r" });
+    browser.post("/api/dataset/open", &limb).json();
+    browser.post("/api/save", &json!({})).json();
+    let plan = browser.get("/api/plan/form").json();
+    assert_eq!(plan["limbs"][0]["case"], "p01.case.toml");
+    let plan = Plan::read(plan["current"].as_str().unwrap().as_ref()).unwrap();
+    let case = Case::read(&plan.cases[0].file).unwrap();
+    assert_eq!(case.choices.joint_region, Some([8.0, 20.0]));
+}
+
+#[test]
 fn what_finds_nothing_changes_nothing() {
     let browser = Browser::new();
     let before = browser.get("/api/state").json();

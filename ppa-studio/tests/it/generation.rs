@@ -55,6 +55,21 @@ fn files(root: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
+fn changes_of_a_plan_that_were_removed_do_not_replace_it() {
+    let browser = opened();
+    let before = std::fs::read_to_string(&browser.case).unwrap();
+    let change = json!({ "key": "rotation.step_deg", "value": "2.5" });
+    browser.post("/api/plan/key", &change).json();
+    let edited = browser.folder.path().join("ankles.edited.toml");
+    std::fs::remove_file(&edited).unwrap();
+    let folder = json!({ "folder": "ankles" });
+    browser.post("/api/generation", &folder).json();
+    browser.post("/api/generation/pause", &folder).json();
+    wait(&browser, |found| found["phase"] != "stopping");
+    assert_eq!(std::fs::read_to_string(&browser.case).unwrap(), before);
+}
+
+#[test]
 fn a_dataset_of_the_page_is_that_of_the_library() {
     let browser = opened();
     assert_eq!(state(&browser)["phase"], "absent");

@@ -118,6 +118,17 @@ fn a_dragged_landmark_is_saved_and_undone() {
         let chosen = Case::read(&edited).unwrap().choices.joint_centre.unwrap();
         page.picture("landmarks_chosen").await;
 
+        // In a field of text, the keys that undo a change undo typing only.
+        page.click("#tab-generation").await;
+        page.click("#plan-folder").await;
+        page.press("\u{e009}z\u{e000}").await;
+        page.click("#tab-landmarks").await;
+        page.wait("!document.body.hasAttribute('aria-busy')").await;
+        assert_eq!(
+            Case::read(&edited).unwrap().choices.joint_centre,
+            Some(chosen)
+        );
+
         // A reload shows the same; the keyboard undoes it.
         page.client.refresh().await.unwrap();
         page.wait(&format!(
@@ -247,6 +258,17 @@ fn images_follow_the_sliders_and_the_newest_wins() {
                 .await,
             json!("20")
         );
+
+        // Sliders that were not moved show the exposure of the technique.
+        page.pick("technique", "knee").await;
+        page.wait("document.getElementById('slider-kvp').value === '65'")
+            .await;
+        let kvp = "document.querySelector('label[for=slider-kvp]').textContent";
+        assert_eq!(
+            page.value(kvp).await,
+            json!("Tube voltage 65 kV, from the technique")
+        );
+        page.pick("technique", "").await;
 
         // Each step has an address: back leads to the previous one.
         page.click("#tab-room").await;

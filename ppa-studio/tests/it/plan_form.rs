@@ -46,10 +46,16 @@ fn a_changed_setting_is_saved_beside_the_plan() {
 
     // Images of the page follow the plan, and the next studio continues with it.
     set(&browser, "xray.kvp", json!("70")).json();
-    assert_eq!(browser.get("/api/state").json()["planned"]["kvp"], 70.0);
+    assert_eq!(
+        browser.get("/api/state").json()["planned"]["exposure"]["kvp"],
+        70.0
+    );
     let Browser { folder, case, .. } = browser;
     let browser = Browser::of(folder, case);
-    assert_eq!(browser.get("/api/state").json()["planned"]["kvp"], 70.0);
+    assert_eq!(
+        browser.get("/api/state").json()["planned"]["exposure"]["kvp"],
+        70.0
+    );
 
     // A change is undone and redone; the file follows.
     let edited_text = || std::fs::read_to_string(&edited).unwrap();
@@ -65,7 +71,10 @@ fn a_changed_setting_is_saved_beside_the_plan() {
         (&json!(false), &json!(true))
     );
     assert!(edited_text().contains("kvp = 70"), "{}", edited_text());
-    assert_eq!(browser.get("/api/state").json()["planned"]["kvp"], 70.0);
+    assert_eq!(
+        browser.get("/api/state").json()["planned"]["exposure"]["kvp"],
+        70.0
+    );
     let form = browser.post("/api/plan/redo", &json!({})).json();
     assert_eq!(field(&form, "xray.kvp")["value"], "80");
     assert_eq!(

@@ -67,13 +67,23 @@ impl Projection {
 
     /// The same tube with the detector rotated about its centre: first about device x, then about device y, radians.
     ///
-    /// The device frame rotates with the detector; tube and patient do not move.
+    /// The device frame rotates with the detector; tube and patient do not move. A rectangular field and the side marker keep their
+    /// place relative to the detector's centre; a fan is about the new z axis.
     #[must_use]
     pub fn with_detector_turned(&self, about_x: f64, about_y: f64) -> Self {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), about_y)
             * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), about_x);
         let [x, y] = self.detector.centre_mm;
         let centre = turn.inverse() * Vector3::new(x, y, self.source_detector_mm);
+        let moved = |[at_x, at_y]: [f64; 2]| [at_x + centre.x - x, at_y + centre.y - y];
+        let mut source = self.source;
+        if let Collimation::Rectangle { centre_mm, .. } = &mut source.collimation {
+            *centre_mm = moved(*centre_mm);
+        }
+        let mut marker = self.marker;
+        if let Some(marker) = &mut marker {
+            marker.centre_mm = moved(marker.centre_mm);
+        }
         Self {
             ct_from_device: self.ct_from_device * turn,
             source_detector_mm: centre.z,
@@ -82,6 +92,8 @@ impl Projection {
                 ..self.detector
             },
             central_ray: turn.inverse() * self.central_ray,
+            source,
+            marker,
             ..self.clone()
         }
     }
@@ -264,6 +276,17 @@ mod tests {
         assert!((centre(&straight) - centre(&turned)).norm() < 1e-9);
         let ray = turned.ct_from_device * turned.central_ray.into_inner();
         assert!((ray - Vector3::z()).norm() < 1e-12);
+        let field = Collimation::Rectangle {
+            size_mm: [150.0, 120.0],
+            centre_mm: [5.0, -8.0],
+        };
+        let source = Source::default().with_collimation(field);
+        let turned = straight.with_source(source).with_detector_turned(0.4, 0.1);
+        let Collimation::Rectangle { centre_mm, .. } = turned.source.collimation else {
+            panic!("{:?}", turned.source.collimation);
+        };
+        let [x, y] = turned.detector.centre_mm;
+        assert!((centre_mm[0] - x - 5.0).abs() + (centre_mm[1] - y + 8.0).abs() < 1e-9);
         let d = turned.source_detector_mm;
         assert!((d - 1_000.0 * 0.4_f64.cos() * 0.1_f64.cos()).abs() < 1e-9);
     }

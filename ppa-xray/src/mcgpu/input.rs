@@ -248,6 +248,12 @@ mod tests {
             let found = mangled::report(SAMPLE, [from, to], |path| Input::read(path));
             assert!(found.contains(report), "{from} → {to}: {found}");
         }
+        // Only the start of a line is a headline.
+        let commented = SAMPLE.replace(".gz ", ".gz # CROSS SECTION data ");
+        let commented = commented.replace(".gz\n", ".gz # CROSS SECTION data\n");
+        assert_ne!(commented, SAMPLE);
+        let materials = |text: &str| read(text.as_bytes()).unwrap().materials.len();
+        assert_eq!(materials(&commented), materials(SAMPLE));
         let (before, _) = SAMPLE.split_once("../materials").unwrap();
         let found = read(before.as_bytes()).unwrap_err().to_string();
         assert!(

@@ -31,7 +31,12 @@ impl Input {
         let trajectory = &self.trajectory;
         let [u, v, _] = self.direction.into_inner().into();
         // The source is opposite to the direction of the beam.
-        let first_deg = (-v).atan2(-u).to_degrees().rem_euclid(360.0);
+        let first_deg = if u as f32 == -1.0 {
+            // MC-GPU takes the angle from u in single precision: rounding errors of v are no turn of 360 degrees.
+            0.0
+        } else {
+            (-v).atan2(-u).to_degrees().rem_euclid(360.0)
+        };
         if trajectory.projections == 1 {
             return vec![Station {
                 number: 0,
@@ -96,6 +101,26 @@ mod tests {
         let mut input = mangled::read(sample.as_bytes(), |path| Input::read(path)).unwrap();
         change(&mut input);
         input
+    }
+
+    #[test]
+    fn rounding_errors_of_the_direction_are_no_turn() {
+        let found = |y: f64| {
+            let turned = |input: &mut Input| {
+                input.direction = Unit::new_normalize(Vector3::new(-1.0, y, 0.0));
+                input.trajectory.angles_of_interest_deg = [0.0, 360.0];
+            };
+            let stations = input(turned).stations();
+            stations
+                .iter()
+                .map(|s| s.angle_deg.round())
+                .collect::<Vec<_>>()
+        };
+        let expected = found(0.0);
+        assert_eq!(expected[0], 0.0);
+        for y in [1e-17, 1.2246e-16, -1.2246e-16] {
+            assert_eq!(found(y), expected, "{y}");
+        }
     }
 
     /// Values that MC-GPU v1.3 prints for `sample.in` with these changes ("Setting the sources and detectors").

@@ -3,16 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use crate::mcgpu::error::McgpuError;
-use crate::mcgpu::lines::{Lines, columns, holds, numbers};
+use crate::mcgpu::lines::{Lines, columns, numbers};
 
-/// Returns the headline of a section, shortened.
+/// Returns the headline of a section, shortened; it may be marked as a comment.
 fn headline(line: &[u8]) -> Option<String> {
+    let marks = |byte: &&u8| matches!(byte, b'#' | b'[' | b' ' | b'\t');
+    let text = &line[line.iter().take_while(marks).count()..];
     let shown = || {
         String::from_utf8_lossy(&line[..line.len().min(80)])
             .trim()
             .to_owned()
     };
-    holds(line, "SECTION ").then(shown)
+    text.starts_with(b"SECTION ").then(shown)
 }
 
 /// A file named in the input file.

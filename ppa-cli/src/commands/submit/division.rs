@@ -166,6 +166,8 @@ fn divided(
         kept.settings = settings;
         return Ok(kept);
     }
+    // The scripts of a dry run are known as such, also if the plan was changed since.
+    let scripts = recorded.as_ref().map(|recorded| recorded.scripts.clone());
     let known = recorded.filter(|recorded| recorded.plan_sha256 == sha256);
     let work = match input {
         Input::Poses(_, plan) => {
@@ -182,8 +184,7 @@ fn divided(
         }
     };
     let mut first = Submission::new(path.to_owned(), sha256, work, settings);
-    // The scripts of a dry run are known as such.
-    first.scripts = known.map(|known| known.scripts).unwrap_or_default();
+    first.scripts = scripts.unwrap_or_default();
     Ok(first)
 }
 
