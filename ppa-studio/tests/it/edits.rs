@@ -86,15 +86,26 @@ fn a_plan_keeps_its_case_when_the_changes_replace_it() {
     browser.post("/api/choices", &region).json();
     let plan = browser.post("/api/plan/save", &json!({})).json();
     assert_eq!(plan["limbs"][0]["case"], "p01.edited.case.toml");
-    // The saved plan is in use: its limb can be opened.
-    let limb = json!({ "patient": 0, "side": "r" });
-    browser.post("/api/dataset/open", &limb).json();
     browser.post("/api/save", &json!({})).json();
     let plan = browser.get("/api/plan/form").json();
     assert_eq!(plan["limbs"][0]["case"], "p01.case.toml");
     let plan = Plan::read(plan["current"].as_str().unwrap().as_ref()).unwrap();
     let case = Case::read(&plan.cases[0].file).unwrap();
     assert_eq!(case.choices.joint_region, Some([8.0, 20.0]));
+}
+
+#[test]
+fn a_saved_plan_is_the_one_in_use() {
+    let browser = Browser::new();
+    let limb = json!({ "patient": 0, "side": "r" });
+    let refused = browser.post("/api/dataset/open", &limb);
+    assert!(
+        refused.text().contains("has no case for"),
+        "{}",
+        refused.text()
+    );
+    browser.post("/api/plan/save", &json!({})).json();
+    browser.post("/api/dataset/open", &limb).json();
 }
 
 #[test]
