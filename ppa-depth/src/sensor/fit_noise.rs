@@ -82,12 +82,12 @@ pub fn fit_noise(
             .check_camera(camera)
             .map_err(|source| FitError::Size { frame, source })?;
     }
-    let (depths, valid) = means(frames);
+    let depths = means(frames);
     // Signal, variance of the range, share of frames without a depth.
     let mut pixels = Vec::new();
     let mut always = 0;
-    for (pixel, (depth, &valid)) in depths.iter().zip(&valid).enumerate() {
-        let (Some(ray), true) = (camera.rays()[pixel], valid > 0) else {
+    for (pixel, depth) in depths.iter().enumerate() {
+        let (Some(ray), true) = (camera.rays()[pixel], depth.frames > 0) else {
             continue;
         };
         let Some(plane) = local_plane(camera, &depths, pixel) else {
@@ -98,13 +98,13 @@ pub fn fit_noise(
         let count = frames.len();
         let variance = depth
             .variance_mm2
-            .filter(|_| valid == count)
+            .filter(|_| depth.frames == count)
             .map(|of_mean| {
                 always += 1;
                 let rounding = if whole_mm { ROUNDING_MM2 } else { 0.0 };
                 (count as f64 * of_mean - rounding) * ray * ray
             });
-        pixels.push((s, variance, 1.0 - valid as f64 / count as f64));
+        pixels.push((s, variance, 1.0 - depth.frames as f64 / count as f64));
     }
     if always < 1000 {
         return Err(FitError::Pixels(always));
@@ -151,19 +151,23 @@ pub fn fit_noise(
     })
 }
 
-/// Mean depths of the frames with a depth, and the numbers of those frames.
-fn means(frames: &[DepthImage]) -> (Vec<MeanDepth>, Vec<usize>) {
+/// Mean depths of the pixels.
+fn means(frames: &[DepthImage]) -> Vec<MeanDepth> {
     let of_pixel = |pixel: usize| {
         let depths = frames.iter().map(|frame| f64::from(frame.z_mm[pixel]));
         let depths = depths.filter(|z| *z > 0.0);
-        let valid = depths.clone().count();
-        let count = valid as f64;
+        let frames = depths.clone().count();
+        let count = frames as f64;
         let z_mm = depths.clone().sum::<f64>() / count.max(1.0);
         let spread = depths.map(|z| (z - z_mm).powi(2)).sum::<f64>();
-        let variance_mm2 = (valid > 1).then(|| spread / (count - 1.0) / count);
-        (MeanDepth { z_mm, variance_mm2 }, valid)
+        let variance_mm2 = (frames > 1).then(|| spread / (count - 1.0) / count);
+        MeanDepth {
+            z_mm,
+            variance_mm2,
+            frames,
+        }
     };
-    (0..frames[0].z_mm.len()).map(of_pixel).unzip()
+    (0..frames[0].z_mm.len()).map(of_pixel).collect()
 }
 
 /// Least squares of y = a + b x with weights 1/y², since the spread of a variance is proportional to it; a and b are at least 0.

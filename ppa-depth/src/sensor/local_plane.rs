@@ -18,6 +18,8 @@ pub(crate) struct MeanDepth {
     pub z_mm: f64,
     /// Variance of the mean, mm²; `None` if it is unknown.
     pub variance_mm2: Option<f64>,
+    /// Number of frames with a depth.
+    pub frames: usize,
 }
 
 /// The plane at a pixel.
@@ -52,11 +54,12 @@ pub(crate) fn local_plane(
             (depth.z_mm > 0.0).then(|| (Vector3::new(offset.x, offset.y, 1.0), depth))
         })
     };
-    let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);
+    // Normal equations of the least squares.
+    let (mut matrix, mut right_side, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);
     let (mut variance_mm2, mut known) = (0.0, 0);
     for (at, depth) in window() {
-        normal += at * at.transpose();
-        right += at / depth.z_mm;
+        matrix += at * at.transpose();
+        right_side += at / depth.z_mm;
         count += 1;
         if let Some(one) = depth.variance_mm2 {
             variance_mm2 += one;
@@ -66,7 +69,7 @@ pub(crate) fn local_plane(
     if count < LEAST_PIXELS {
         return None;
     }
-    let plane = normal.cholesky()?.solve(&right);
+    let plane = matrix.cholesky()?.solve(&right_side);
     let square = |(at, depth): (Vector3<f64>, MeanDepth)| {
         let fitted = plane.dot(&at);
         ((1.0 / depth.z_mm - fitted) / (fitted * fitted)).powi(2)
@@ -80,10 +83,10 @@ pub(crate) fn local_plane(
     }
     // n / d of the plane, from its slopes and its value at the middle.
     let of_axis = inverse_z - plane.x * middle.x - plane.y * middle.y;
-    let across = Vector3::new(plane.x, plane.y, of_axis).norm();
+    let normal = Vector3::new(plane.x, plane.y, of_axis).norm();
     let ray = (1.0 + middle.norm_squared()).sqrt();
     Some(LocalPlane {
         z_mm: 1.0 / inverse_z,
-        cos_incidence: inverse_z / (across * ray),
+        cos_incidence: inverse_z / (normal * ray),
     })
 }
