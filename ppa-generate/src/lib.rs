@@ -77,7 +77,7 @@ mod write_archive;
 
 pub use case::{Case, CaseError, Found, Source};
 pub use case_check::{CaseCheck, CaseCheckError, Drift};
-pub use case_names::{beside_case, edited_case, original_case};
+pub use case_names::{beside_case, edited_case, original_case, plan_of_dataset};
 pub use check::{Check, Problem, check};
 pub use closed_skin::closed_skin;
 pub use coverage_study::{

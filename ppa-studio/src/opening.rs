@@ -7,7 +7,7 @@ use ppa_ct::{ReadOptions, Volume, write_nifti};
 use ppa_dataset::files::FileError;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_dataset::manifest::DESCRIPTION_FILE;
-use ppa_generate::{Case, Plan, PrepareError, prepare, prepare_scan};
+use ppa_generate::{Case, Plan, PrepareError, plan_of_dataset, prepare, prepare_scan};
 use ppa_mesh::LimbSettings;
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkOverrides, LimbKind, Side};
@@ -157,10 +157,8 @@ fn of_dataset(path: &Path) -> Result<Opened, StudioError> {
         // Such as `.`.
         None => path.canonicalize().map_err(FileError::at("find", path))?,
     };
-    let mut name = root.file_name().unwrap_or_default().to_owned();
-    name.push(".toml");
     Ok(Opened {
-        plan_file: Some(root.with_file_name(name)),
+        plan_file: Some(plan_of_dataset(&root)),
         dataset: Some(root),
         ..Opened::default()
     })

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ppa_core::Part;
 use ppa_core::text::count;
-use ppa_dataset::archive::is_archive;
 use ppa_dataset::published::{Published, PublishedError};
 use ppa_generate::{GenerateSettings, Plan, Progress, Summary, generate, held_part};
 
@@ -102,22 +101,6 @@ pub fn dataset_folder(plan: &Path) -> anyhow::Result<PathBuf> {
     Ok(folder)
 }
 
-/// The plan next to a dataset that is named after it, as [`dataset_folder`] names datasets.
-pub fn plan_of(dataset: &Path) -> PathBuf {
-    // Such as `.`.
-    let unnamed = dataset.file_name().is_none();
-    let whole = unnamed.then(|| dataset.canonicalize().ok()).flatten();
-    let dataset = whole.as_deref().unwrap_or(dataset);
-    let stem = if is_archive(dataset) {
-        dataset.file_stem()
-    } else {
-        dataset.file_name()
-    };
-    let mut name = stem.unwrap_or_default().to_owned();
-    name.push(".toml");
-    dataset.with_file_name(name)
-}
-
 /// Generates a dataset and shows the progress.
 pub fn with_progress(
     plan: &Plan,
@@ -177,24 +160,4 @@ fn listed(done: &str, files: &[String]) -> String {
         .collect::<Vec<_>>()
         .join(", ");
     format!("\n{done}: {first}{more}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_dataset_is_named_after_its_plan() {
-        for plan in ["ankles.toml", "small.plan.toml", "a/cohort_v1.2.toml"] {
-            let plan = Path::new(plan);
-            let folder = dataset_folder(plan).unwrap();
-            assert_eq!(plan_of(&folder), plan);
-            let mut archive = folder.into_os_string();
-            archive.push(".tar");
-            assert_eq!(plan_of(Path::new(&archive)), plan);
-        }
-        assert!(dataset_folder(Path::new("plan")).is_err());
-        let here = std::env::current_dir().unwrap();
-        assert_eq!(plan_of(Path::new(".")), here.with_extension("toml"));
-    }
 }

@@ -6,10 +6,9 @@ use anyhow::bail;
 use clap::Args;
 use ppa_core::text::count;
 use ppa_dataset::Findings;
-use ppa_generate::{Plan, verify};
+use ppa_generate::{Plan, plan_of_dataset, verify};
 use serde::Serialize;
 
-use crate::commands::generate::plan_of;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::Output;
 use crate::progress::ProgressArgs;
@@ -44,7 +43,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     let path = match &args.plan {
         Some(path) => path.clone(),
         None => {
-            let beside = plan_of(&args.dataset);
+            let beside = plan_of_dataset(&args.dataset);
             anyhow::ensure!(
                 beside.exists(),
                 "{} does not exist; use --plan to give the plan that {} was made from",

@@ -8,11 +8,10 @@ use ppa_core::text::{count, number};
 use ppa_dataset::Manifest;
 use ppa_dataset::labels::LabelName;
 use ppa_dataset::layout::LimbId;
-use ppa_generate::{Case, Plan};
+use ppa_generate::{Case, Plan, plan_of_dataset};
 use ppa_label::{CaseBones, ComputedLabels, LabelScale, LabelledLimb, ScaleName, compute_labels};
 use serde::Serialize;
 
-use crate::commands::generate::plan_of;
 use crate::findings::repeat_of_datasets;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
@@ -79,7 +78,7 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
         None => LabelScale::new(args.scale),
     };
     let manifest = Manifest::read(&args.dataset)?;
-    let beside = || plan_of(&args.dataset);
+    let beside = || plan_of_dataset(&args.dataset);
     let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
     require_writable("the dataset", &args.dataset)?;
     let stoppable = ends_at_once(NOTHING_WRITTEN)?;
